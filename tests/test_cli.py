@@ -106,7 +106,7 @@ WRONG = [
     ("extract *.bag -o f.parquet", 1, "*.bag: holds no log"),
     ("extract wall.npz -o f.csv --resume", 2, "--resume: expected a"),
     ("extract wall.npz -o f.csv --format csv", 2, "--format: expected a"),
-    ("extract wall.npz -o out/ --format xls", 1, "'.xls' is not known"),
+    ("extract wall.npz -o out/ --format xls", 2, "--format .xls: expected one of"),
     ("extract . -o ./ --threads 1 --processes 1", 2, "one of --"),
     ("extract . -o ./ --threads 0", 2, "--threads"),
     ("extract empty.log -o f.parquet", 1, "empty.log: is empty"),
@@ -415,6 +415,35 @@ def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
     assert capsys.readouterr().out == "kernels ready after 2.50 s\n"
     assert run(["warmup", "-q", "-m", "pdbs", "-m", "liu"]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ("plan a.svg -o b.dxf --dark", "--dark: expected a picture, .png or .pdf, not .dxf"),
+        ("plan a.svg -o b.dxf --resolution 1", "--resolution: expected a grid, .yaml, not .dxf"),
+        ("plan a.yaml -o b.yaml --resolution 1", "a.yaml is a grid, whose cells are kept"),
+        ("map a.bag -o b.svg --odometry /o --no-odometry", "expected none beside --no-odometry"),
+        (
+            "locate a.bag --map a.svg -o b.csv --odometry /o --no-odometry",
+            "--odometry /o: expected none beside --no-odometry",
+        ),
+        (
+            "calibrate a.bag --topic /a --against /b --track 0.4",
+            "--track: is of wheels, expected none beside --against",
+        ),
+        (
+            "calibrate a.bag --topic /a --against /b --odometry /o",
+            "--odometry: is of wheels, expected none beside --against",
+        ),
+        ("extract a.bag -o b.csv --set evidence=6 --set evidence=24", "evidence is given twice"),
+        ("info a.bag --limit beams=6 --limit beams=24", "'beams=24': beams is given twice"),
+        ("merge a.bag -o b.csv --mounting a=0,0,0 --mounting a=1,0,0", "a is given twice"),
+        ("extract a.bag -o out/ --format pdf", "--format .pdf: expected one of .parquet, .csv"),
+    ],
+)
+def test_options_that_would_change_nothing_are_refused(given, problem, refused):
+    assert problem in refused(given, 2)
 
 
 def test_reproduce_runs_what_is_asked_for_on_the_recordings_of_the_environment(

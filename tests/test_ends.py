@@ -4,12 +4,16 @@ import errno
 import io
 import os
 import re
+import runpy
 import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 import click
 import pytest
@@ -19,7 +23,7 @@ from text_logs import FLASER
 
 import lineament as ln
 from lineament import LogError, files
-from lineament.cli import cli, run
+from lineament.cli import cli, run, terminating
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
 from lineament.logs import open_log, save_npz
@@ -196,6 +200,18 @@ def test_a_signal_leaves_no_half_file(command, name, work, monkeypatch, capsys):
     assert {n: signal.getsignal(n) for n in before} == before
 
 
+def test_ctrl_c_while_the_command_is_imported(monkeypatch, capsys):
+    class Interrupted(ModuleType):
+        def __getattr__(self, _):
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "lineament.cli", Interrupted("lineament.cli"))
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("lineament", run_name="__main__")
+    assert ended.value.code == 130
+    assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+
 @posix
 @pytest.mark.filterwarnings("ignore")
 def test_a_signal_that_is_lost_in_a_callback_comes_again(capsys, monkeypatch):
@@ -211,6 +227,36 @@ def test_a_signal_that_is_lost_in_a_callback_comes_again(capsys, monkeypatch):
     monkeypatch.setattr("lineament.methods.describe", wait)
     assert run(["methods"]) == 128 + signal.SIGTERM
     assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+
+@posix
+def test_a_signal_that_compiled_code_clears_comes_again(capsys, monkeypatch):
+    def wait(*_, **__):
+        for _ in range(3):
+            with suppress(BaseException):  # as PyErr_Clear does
+                signal.raise_signal(signal.SIGTERM)
+        time.sleep(10)
+
+    monkeypatch.setattr("lineament.methods.describe", wait)
+    assert run(["methods"]) == 128 + signal.SIGTERM
+    assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+
+@posix
+def test_a_signal_that_was_lost_does_not_come_after_the_command(monkeypatch):
+    def swallow(*_, **__):
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        return "found"
+
+    monkeypatch.setattr("lineament.methods.describe", swallow)
+    monkeypatch.setattr(sys.modules[terminating.__module__], "_PATIENCE", 5)
+    came, threads = [], threading.active_count()
+    monkeypatch.setattr(os, "kill", lambda *signal: came.append(signal))
+    assert run(["methods"]) == 0
+    while threading.active_count() > threads:
+        time.sleep(0.01)
+    assert came == []
 
 
 # Full disks, closed pipes

@@ -187,8 +187,8 @@ def test_the_command(files, capsys, log, ending):
     scans = 12 if log == "log" else 1
     assert status == 0
     assert all(line.endswith(" left") for line in said.err.splitlines())  # The progress alone.
-    assert f"{scans} scans: 100.0 % located" in said.out
-    assert "located first after 0.0 s, lost 0 times" in said.out
+    assert f" {scans} scan{'s' if scans > 1 else ''}: 100.0 % located" in said.out
+    assert "located first in scan 0, after 0.0 s, lost 0 times since" in said.out
     if ending == "parquet":
         table = pq.read_table(out)
         assert table["verdict"].to_pylist() == ["located"] * scans
@@ -252,6 +252,19 @@ def test_the_picture_shows_where_the_way_is_not_known(monkeypatch):
     locate_task.draw(places[:1], plan_of(room()), "a.png", "title", "about")
     (axes,) = saved[1].axes
     assert not axes.lines  # Never located: the plan alone.
+
+
+def test_a_clock_that_is_set_back_takes_no_time(files, capsys):
+    scans = list(ln.open_log(files / "log.npz"))
+    blind = ln.LaserScan(
+        np.full(len(scans[0]), np.inf), scans[0].angle_min, scans[0].angle_increment
+    )
+    seen = [blind, blind, *scans[:3], *[blind] * 40]
+    stamps = [10.0, 4.0, 4.5, 3.0, *np.arange(3.1, 90.0, 0.1)]
+    save_npz(files / "log.npz", [bare(scan, at) for scan, at in zip(seen, stamps, strict=False)])
+    options = ["--map", str(files / "plan.dxf"), "-o", str(files / "poses.csv")]
+    assert run(["locate", f"{files}/log.npz", *options]) == 0
+    assert "located first in scan 3, after 0.5 s, lost once since" in capsys.readouterr().out
 
 
 def test_a_picture_does_not_replace_the_image_of_the_grid(files, refused):

@@ -15,7 +15,7 @@ from lineament.cli import cli
 from lineament.errors import LineamentError
 from lineament.features import SEGMENT
 from lineament.logs import save_log
-from lineament.mapping import LineMap
+from lineament.mapping import LineMap, hypotheses
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map, roughness, single, widened
@@ -285,6 +285,18 @@ def test_what_makes_no_map_is_one_line(
     save_log("log.npz", [empty.with_pose((0.01 * k, 0, 0)) for k in range(scans)])
     assert message in refused(f"map log.npz -o {output}", status)
     assert not (tmp_path / output.split()[0]).exists()
+
+
+def test_a_map_with_too_many_walls_beside_each_other_is_not_called_a_plan(
+    tmp_path, monkeypatch, refused
+):
+    monkeypatch.setattr(hypotheses, "_MOST_PAIRS", 20)
+    monkeypatch.setattr(hypotheses, "_FEW", 3)
+    scans = drive(room(), [(-2, 0), (-1, 0.5)], SENSORS["lms181"], speed=0.5, rate=1)
+    save_log(tmp_path / "log.npz", list(scans))
+    error = refused(["map", tmp_path / "log.npz", "-o", tmp_path / "m.svg", "-q"])
+    assert re.search(r"^lineament: \d+ pairs of \d+ walls lie beside each other", error)
+    assert "plan" not in error
 
 
 def test_one_scan_is_a_map():

@@ -1,6 +1,9 @@
 """Plans: walls from features, from DXF, from tables; what is no plan; written and read again."""
 
 import math
+import os
+import sys
+from functools import partial
 
 import ezdxf
 import numpy as np
@@ -13,7 +16,7 @@ import lineament as ln
 from lineament.cli import run
 from lineament.drawings import UNITS
 from lineament.logs import save_log
-from lineament.mapping import LineMap, locate
+from lineament.mapping import Grid, LineMap, locate
 from lineament.simulation import SENSORS, drive, office, room
 
 
@@ -188,6 +191,18 @@ def test_layers_and_units_are_of_a_dxf(tmp_path, ending):
             LineMap.read(path, **asked)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+@pytest.mark.parametrize("ending", [".dxf", ".svg", ".parquet"])
+def test_a_plan_whose_path_is_no_text_is_read(tmp_path, ending):
+    path = tmp_path / (os.fsdecode(b"plan-\xff") + ending)
+    LineMap.from_lines(ROOM, side=1).write(path)
+    assert len(LineMap.read(path).walls) == len(ROOM)
+    path.write_bytes(b"")
+    with pytest.raises(ln.LineamentError) as caught:
+        LineMap.read(path)
+    assert str(caught.value).count("plan-") == 1
+
+
 def test_layer_that_is_not_there_names_those_that_are(tmp_path):
     path = draw(tmp_path / "a.dxf")
     with pytest.raises(ln.LineamentError, match=r"no layer is B-\*; there are: A-WALL, DOORS"):
@@ -256,6 +271,30 @@ LINES, SEEN, EMPTY, EYE = LineMap.from_lines, LineMap.from_features, features(),
         (EMPTY.transform, ["0", 0, 0], "pose is .* expected three finite numbers"),
         (locate, [EMPTY, LINES(ROOM), None, EYE], "a covariance is given without a guess"),
         (office, [1, (30_000, 20_000)], "expected 20 m x 16 m to 300 m x 300 m"),
+        (
+            LINES,
+            ["plan.dxf"],
+            r"^lines are 'plan.dxf', expected numbers of shape \(n, 4\) or \(n, 2, 2\)$",
+        ),
+        (
+            LINES,
+            [ROOM, [[1, 1, 1], [1, 1]]],
+            r"^columns are \[\[1, 1, 1\], \[1, 1\]\], expected numbers of shape \(n, 3\)$",
+        ),
+        (partial(LINES, side=2), [ROOM], "^side is 2, expected 0 or 1$"),
+        (partial(LINES, sigma=-0.1), [ROOM], "^sigma is -0.1, expected a length ≥ 0$"),
+        (partial(LINES, sigma=math.nan), [ROOM], "^sigma is nan, expected a length ≥ 0$"),
+        (
+            partial(LineMap.read, layers="A-WALL*"),
+            ["plan.dxf"],
+            r"^layers are 'A-WALL\*', expected a list of names$",
+        ),
+        (
+            Grid,
+            [np.zeros((3, 3)), 0.05],
+            r"^cells are float64 of shape \(3, 3\), expected int8 in rows and columns$",
+        ),
+        (Grid, [np.zeros((3, 3), np.int8), 0], "^resolution is 0, expected a length > 0$"),
     ],
 )
 def test_what_would_be_half_taken_is_refused(call, given, problem):

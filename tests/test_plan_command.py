@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -108,7 +111,8 @@ def test_a_grid_is_as_far_off_in_memory_as_in_a_file(plan):
 @pytest.mark.usefixtures("plan")
 @pytest.mark.parametrize("ending", ["png", "pdf", "csv", "jsonl"])
 def test_pictures_and_tables_are_written(ending):
-    assert run(["plan", "room.svg", "-o", f"a.{ending}", "-q", "--dark"]) == 0
+    dark = ["--dark"] if ending in ("png", "pdf") else []
+    assert run(["plan", "room.svg", "-o", f"a.{ending}", "-q", *dark]) == 0
     assert Path(f"a.{ending}").stat().st_size > 300
 
 
@@ -160,3 +164,21 @@ def test_what_cannot_be_converted_is_one_line(plan, refused, arguments, status, 
         Path(name).write_text(text, encoding="utf-8")
     plan.write("a.yaml")
     assert line in refused(arguments, status)
+
+
+@pytest.mark.parametrize(("given", "output"), [("a.svg", "b.dxf"), ("a.dxf", "b.svg")])
+def test_a_home_that_cannot_be_written_is_no_line(tmp_path, given, output):
+    """There ezdxf, which is imported anew, logs that it has no cache."""
+    LineMap.from_lines(ROOM).write(tmp_path / given)
+    (tmp_path / "home").touch()
+    home = str(tmp_path / "home")
+    command = [sys.executable, "-m", "lineament", "plan", given, "-o", output]
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env=os.environ | {"HOME": home, "XDG_CACHE_HOME": f"{home}/cache"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""

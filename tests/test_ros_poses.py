@@ -289,6 +289,14 @@ def test_a_log_without_topics_has_its_own_poses(tmp_path):
         assert open_log(path, pose_topic="/odom").scan(0).pose == (7.0, 8.0, 0.0)
 
 
+@pytest.mark.parametrize("option", [{"ring": 3}, {"echo": "last"}])
+def test_a_log_without_rings_and_echoes_says_so(tmp_path, option):
+    path = tmp_path / "a.log"
+    path.write_text("FLASER 2 1.5 1.6 7 8 0 0 0 0 7.5 robot 7.5")
+    with pytest.warns(LineamentWarning, match=r"a\.log: has neither rings nor echoes: all of it"):
+        assert len(open_log(path, **option)) == 1
+
+
 def test_poses_of_motion_capture(data_dir):
     """The truth of this run was refined from them: they agree to centimetres."""
     topic = "/vrpn_client_node/jackal/pose"

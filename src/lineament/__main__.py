@@ -1,5 +1,17 @@
-"""``python -m lineament``."""
+"""The command ``lineament``, also as ``python -m lineament``."""
 
-from .cli import main
+import sys
 
-main()
+
+def main() -> None:
+    """Run the command line; Ctrl-C while it is imported is one line, too."""
+    try:
+        from .cli import main
+    except KeyboardInterrupt:
+        print("lineament: stopped", file=sys.stderr)
+        sys.exit(130)
+    main()
+
+
+if __name__ == "__main__":
+    main()

@@ -35,7 +35,9 @@ _WHOLE = ("LWPOLYLINE", "POLYLINE", "MLINE")
 _BEGINS = re.compile(rb"^[ \t]*0[ \t]*\r?$", re.MULTILINE), re.compile(rb"\0[A-Z]")
 _BINARY = b"AutoCAD Binary DXF"
 
-_QUIET = logging.NullHandler()
+# Before ezdxf is imported: else what it ignores of a damaged file, and that it has no home for its
+# cache, stands on the screen.
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
 Numbers = NDArray[np.int64]
 _Error = Callable[[str], LineamentError]
@@ -94,10 +96,10 @@ def read_drawing(
     """Return what is drawn on some layers of a DXF; see `LineMap.read`."""
     if units is not None and units not in NAMES:
         raise ValueError(f"units are {units!r}, expected one of {', '.join(NAMES)}")
+    if isinstance(layers, str):  # Its letters are no layers, and a * among them is every layer.
+        raise ValueError(f"layers are {layers!r}, expected a list of names")
     with needed_by(f"{path}:"):
         import ezdxf
-    # Else what it ignores of a damaged file stands on the screen.
-    logging.getLogger("ezdxf").addHandler(_QUIET)
     error = plan_error(path)
     check_file(path, limits)
     try:

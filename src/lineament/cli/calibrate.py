@@ -56,6 +56,9 @@ def calibrate(
     check_ending(output, PICTURE_ENDINGS)
     if against is not None and reading["topic"] is None:
         raise click.UsageError("--against: expected --topic, too: that whose mounting is found")
+    for name, value in (("--track", track_width), ("--odometry", reading["pose_topic"])):
+        if against is not None and value is not None:
+            raise click.UsageError(f"{name}: is of wheels, expected none beside --against")
     if reading.pop("laser_pose") is not None:
         raise click.UsageError("--laser-pose: is what calibrate finds, expected no such option")
     done = calibrate_log(

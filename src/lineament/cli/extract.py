@@ -103,11 +103,14 @@ def _extract_into_folder(
     resume: bool,
     **given: Any,
 ) -> None:
+    from ..output import ENDINGS
     from ..tasks.bulk import extract_logs
     from ..tasks.extract import check_found
     from .progress import status
 
     ending = f".{(given.pop('format') or 'parquet').removeprefix('.')}"
+    if ending not in ENDINGS:
+        raise click.UsageError(f"--format {ending}: expected one of {', '.join(ENDINGS)}")
     check_world(world, ending)
     with _executor(**given) as executor, status(quiet) as show:
         bulk = extract_logs(

@@ -23,6 +23,13 @@ if TYPE_CHECKING:
     from ..extractor import Extractor
 
 _NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
+
+
+def _check_odometry(no_odometry: bool, topic: str | None) -> None:
+    if no_odometry and topic is not None:
+        raise click.UsageError(f"--odometry {topic}: expected none beside --no-odometry")
+
+
 #: Formats that a map is written in.
 _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
 #: Those of a picture of walls and a way; in `plan -o` an .svg is a plan.
@@ -64,6 +71,7 @@ def map_command(
     from .progress import tracker
 
     check_ending(output, _ENDINGS)
+    _check_odometry(no_odometry, reading["pose_topic"])
     check_ending(poses, (".tum", ".txt"))
     check_ending(picture, _PICTURES)
     if merge and onto is None:
@@ -123,6 +131,7 @@ def locate(
     from .progress import tracker
 
     check_ending(output, ENDINGS)
+    _check_odometry(no_odometry, reading["pose_topic"])
     check_ending(picture, _PICTURES)
     found = locate_log(
         log,
@@ -150,22 +159,32 @@ def locate(
 @click.option(
     "--resolution",
     type=click.FloatRange(min=0, min_open=True),
-    default=0.05,
-    show_default=True,
-    help="Size of the cells of a grid that is drawn [m].",
+    help="Size of the cells of a grid that is drawn [m].  [default: 0.05]",
 )
 @click.option("--dark", is_flag=True, help="Draw on black.")
 @LIMITS
 @QUIET
-def plan(plan: Path, output: Path, quiet: bool, **given: Any) -> None:
+def plan(
+    plan: Path, output: Path, resolution: float | None, dark: bool, quiet: bool, **given: Any
+) -> None:
     """Write PLAN in another format, or draw it.
 
     PLAN is a .dxf, .yaml (an occupancy grid of nav2), .parquet or .svg of lineament; OUTPUT one of
     them, .csv, .jsonl, .geojson (in metres), .png or .pdf.
     """
-    from ..tasks.plan import ENDINGS, convert_plan
+    from ..mapping.grids import GRID_ENDINGS
+    from ..tasks.plan import ENDINGS, PICTURES, convert_plan
 
     check_ending(output, ENDINGS)
-    done = convert_plan(plan, output, **given)
+    before, ending = plan.suffix.lower(), output.suffix.lower()
+    if dark and ending not in PICTURES:
+        raise click.UsageError(f"--dark: expected a picture, {' or '.join(PICTURES)}, not {ending}")
+    if resolution is not None:
+        if ending not in GRID_ENDINGS:
+            raise click.UsageError(f"--resolution: expected a grid, .yaml, not {ending}")
+        if before in GRID_ENDINGS:
+            raise click.UsageError(f"--resolution: {plan} is a grid, whose cells are kept")
+        given["resolution"] = resolution
+    done = convert_plan(plan, output, dark=dark, **given)
     if not quiet:
         click.echo(done)

@@ -92,7 +92,7 @@ MASK = click.option(
 
 def _mountings(given: tuple[str, ...]) -> dict[str, tuple[float, float, float]]:
     found = {}
-    for topic, value in map(_split, given):
+    for topic, value in _pairs(given).items():
         try:
             x, y, degrees = map(float, value.split(","))
         except ValueError:
@@ -158,10 +158,8 @@ _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of t
 def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
-    found: dict[str, Any] = dict(map(_split, given))
-    for name, value in found.items():
-        with suppress(ValueError):  # `Limits` refuses what is no number.
-            found[name] = int(value)
+    # `Limits` refuses what is no number.
+    found = {name: _literal(value) for name, value in _pairs(given).items()}
     with wrong_usage():
         Limits.of(found)
     return found or None
@@ -319,19 +317,23 @@ def extracting(command: _Command) -> _Command:
 
 def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
     """Return the parameters of a method that ``--set NAME=VALUE`` gives, by name."""
-    return dict(_setting(text) for text in settings)
+    return {name: _literal(value) for name, value in _pairs(settings).items()}
 
 
-def _split(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise click.UsageError(f"{text!r}: expected NAME=VALUE")
-    return name, value
+def _pairs(given: tuple[str, ...]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not name or not equals:
+            raise click.UsageError(f"{text!r}: expected NAME=VALUE")
+        if name in found:
+            raise click.UsageError(f"{text!r}: {name} is given twice")
+        found[name] = value
+    return found
 
 
-def _setting(text: str) -> tuple[str, Any]:
-    name, value = _split(text)
+def _literal(value: str) -> Any:
     try:
-        return name, ast.literal_eval(value)
+        return ast.literal_eval(value)
     except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
-        return name, value
+        return value

@@ -4,11 +4,12 @@ import os
 import signal
 import sys
 import threading
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-#: Seconds until a signal is sent again that was lost in a callback.
+#: Seconds until a signal is sent again that was lost.
 _PATIENCE = 0.05
 
 
@@ -24,29 +25,35 @@ class Terminated(BaseException):
 def terminating() -> Iterator[None]:
     """Raise `Terminated` where SIGTERM or SIGHUP comes within; later ones change nothing.
 
-    Other threads than the main one cannot: there nothing changes. What is ignored, as by ``nohup``,
-    stays so.
+    Compiled code, of packages that are imported say, may clear errors or report them in place of
+    raising them: if the exception is gone and the command is not, the signal is sent again. Other
+    threads than the main one cannot: there nothing changes. What is ignored, as by ``nohup``, stays
+    so.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    is_ending = False
+    ending: weakref.ref[Terminated] | None = None
+    again: list[threading.Timer] = []
 
     def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        nonlocal is_ending
-        if not is_ending:
-            is_ending = True
-            raise Terminated(number)
+        if ending is None or ending() is None:
+            raise watched(Terminated(number))
+
+    def watched(stopped: Terminated) -> Terminated:
+        nonlocal ending
+        number = stopped.number
+
+        def lost(_: "weakref.ref[Terminated]") -> None:
+            again.append(threading.Timer(_PATIENCE, os.kill, (os.getpid(), number)))
+            again[-1].start()
+
+        ending = weakref.ref(stopped, lost)
+        return stopped
 
     def note(unraisable: "sys.UnraisableHookArgs") -> None:
-        # Raised within a callback, of the compiler say, it is lost.
-        nonlocal is_ending
         if not isinstance(unraisable.exc_value, Terminated):
             hook(unraisable)
-            return
-        is_ending = False
-        again = os.getpid(), unraisable.exc_value.number
-        threading.Timer(_PATIENCE, os.kill, again).start()
 
     hook, sys.unraisablehook = sys.unraisablehook, note
     numbers = (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
@@ -54,6 +61,9 @@ def terminating() -> Iterator[None]:
     try:
         yield
     finally:
+        ending = None  # From here on it may be gone.
+        for timer in again:
+            timer.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)
         sys.unraisablehook = hook

@@ -121,7 +121,7 @@ class LineLog(Log):
     def _no_scans(self, found: Counter[str]) -> LogError:
         topics = [name for name in self.scan_kinds if found[name]]
         if not found:
-            return LogError(self.name, f"is no log of {self.description}")
+            return LogError(self.name, f"is no log of {self.description}: has no such line")
         if self.topic is not None:
             return self._no_such_topic(topics)
         there = ", ".join(f"{name} ({count})" for name, count in found.most_common(8))

@@ -101,6 +101,10 @@ def _at(values: NDArray[Any], i: int) -> Any:
 def _load(path: str | os.PathLike[str], limits: Limits) -> dict[str, NDArray[Any]]:
     error = partial(LogError, path)
     with reading(path), Path(path).open("rb") as file:
+        begin = file.read(4)
+        if begin[:2] != ZIP[:2]:  # NumPy would suggest to unpickle it.
+            raise error(f"is no whole npz archive: begins with {begin!r}, expected {ZIP!r}")
+        file.seek(0)
         try:
             with np.load(file, allow_pickle=False) as archive:
                 found = list(archive.files)

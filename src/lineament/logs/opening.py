@@ -140,6 +140,8 @@ def open_log(
         source = sources.unzip(source, options.limits, keep_going=keep_going)
     if pose_topic is not None and not reader.has_pose_topics:
         warn(one_line(f"{path}: has no topics of poses: its own are taken, not {pose_topic!r}"))
+    if (ring is not None or echo != "first") and not reader.has_pose_topics:
+        warn(one_line(f"{path}: has neither rings nor echoes: all of it is read"))
     return reader(source, topic, keep_going=keep_going, options=options)
 
 

@@ -54,6 +54,14 @@ class Grid:
     least: int = OCCUPIED
     most: int = FREE
 
+    def __post_init__(self) -> None:
+        cells = np.asarray(self.cells)
+        if cells.dtype != np.int8 or cells.ndim != 2:
+            had = f"{cells.dtype} of shape {cells.shape}"
+            raise ValueError(f"cells are {had}, expected int8 in rows and columns")
+        if not 0 < self.resolution < math.inf:
+            raise ValueError(f"resolution is {self.resolution}, expected a length > 0")
+
     @property
     def occupied(self) -> NDArray[np.bool_]:
         """Which cells are occupied, shape (rows, columns)."""

@@ -88,7 +88,7 @@ def beside(walls: NDArray[np.void]) -> Numbers:
     if (many := int(counts.sum())) > _MOST_PAIRS:
         raise LineamentError(
             f"{many} pairs of {n} walls lie beside each other, expected at most {_MOST_PAIRS}: "
-            "are all lines of the plan walls?"
+            "do lines lie over each other, or are some no walls?"
         )
     one = np.repeat(np.repeat(of, 3), counts)
     offsets = np.arange(many) - np.repeat(np.cumsum(counts) - counts, counts)

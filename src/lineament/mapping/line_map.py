@@ -67,6 +67,8 @@ class LineMap(ReadOnly):
         *,
         sigma: float = 0.0,
     ) -> None:
+        if not 0 <= sigma < math.inf:
+            raise ValueError(f"sigma is {sigma}, expected a length ≥ 0")
         columns = np.zeros(0, COLUMN) if columns is None else columns
         ends = np.concatenate((walls["start"], walls["end"]), axis=1)
         finite = np.isfinite(ends).all(axis=1)
@@ -155,15 +157,12 @@ class LineMap(ReadOnly):
         """Make a plan of lines ``x1 y1 x2 y2`` (n, 4) and columns ``x y r`` (m, 3), known exactly.
 
         Lines may also be pairs of ends (n, 2, 2). `side` is 1 for lines that are seen from their
-        left alone. Raises ValueError for other shapes.
+        left alone. Raises ValueError for anything else.
         """
-        circles, lines = (
-            rows_shaped("columns", columns, (3,)),
-            rows_shaped("lines", ends, (4,), (2, 2)),
-        )
+        circles = rows_shaped("columns", columns, (3,))
+        lines = rows_shaped("lines", ends, (4,), (2, 2)).reshape(-1, 2, 2)
         found = np.zeros(len(circles), COLUMN)
         found["center"], found["radius"], found["views"] = circles[:, :2], circles[:, 2], 1
-        lines = lines.reshape(-1, 2, 2)
         with np.errstate(over="ignore", invalid="ignore"):  # refused, or left out
             walls = walls_of(lines, side=side)
         return cls(walls, found, sigma=sigma)
@@ -285,7 +284,7 @@ class LineMap(ReadOnly):
             plan.left_out += left_out
             len(plan.corners)  # refuses more walls beside each other than a building has
         except LineamentError as error:
-            problem = str(error).removeprefix(f"{path}: ")
+            problem = str(error).removeprefix(one_line(f"{path}: "))
             raise plan_error(path)(problem) from None
         if doubt := doubts(plan.size, plan.left_out, ending in GRID_ENDINGS):
             warn(one_line(f"{path}: {doubt}"))

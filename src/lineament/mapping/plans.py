@@ -81,8 +81,9 @@ def read_table(path: str | os.PathLike[str], limits: Limits) -> tuple[Features, 
     check_file(path, limits)
     error = plan_error(path)
     try:
-        # Texts stay numbers of a dictionary: one of a megabyte may be in each row.
-        with pq.ParquetFile(path, read_dictionary=["kind"]) as file:
+        # Texts stay numbers of a dictionary: one of a megabyte may be in each row. A path that is
+        # no text in UTF-8 is refused by Arrow, an open file is not.
+        with Path(path).open("rb") as data, pq.ParquetFile(data, read_dictionary=["kind"]) as file:
             _check_columns(file.schema_arrow, error)
             about = file.metadata
             limits.check("entities", about.num_rows, error)

@@ -3,6 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+
+from .. import drawings  # noqa: F401 (silences ezdxf before it is imported)
+
+# isort: split
 from ezdxf import units
 from ezdxf.document import Drawing
 from ezdxf.filemanagement import new

@@ -24,10 +24,11 @@ from ..mapping.following import Whereabouts, follow
 from ..mapping.grids import all_files
 from ..mapping.locate import LOCATED, UNOBSERVED
 from ..mapping.plans import is_a_building
+from ..output.canvas import count
 from ..output.figures import plot_walls
 from ..progress import Track, untracked
 from ..scan import LaserScan
-from .mapping import tum_written
+from .mapping import times, tum_written
 
 #: Formats of the poses.
 ENDINGS = (".tum", ".csv", ".parquet")
@@ -40,9 +41,10 @@ _SPREAD = ("xx", "xy", "xtheta", "yy", "ytheta", "thetatheta")
 class Located:
     """Where a log is on a plan.
 
-    Number of scans, and of those with each verdict; time until the first was located [s], NaN if
-    none was; how often the sensor was lost after that; wall time [s]. `warning` is a line about why
-    hardly a scan is located, or "".
+    Number of scans, and of those with each verdict; index of the first that was located, None if
+    none was, and the time until then [s], NaN; how often the sensor was lost after that; wall time
+    [s]. A clock that is set back takes no time. `warning` is a line about why hardly a scan is
+    located, or "".
     """
 
     log: str
@@ -50,6 +52,7 @@ class Located:
     output: str
     scans: int
     verdicts: dict[str, int]
+    first_scan: int | None
     first: float
     lost: int
     warning: str
@@ -60,15 +63,16 @@ class Located:
         is_dxf = Path(self.plan).suffix.lower() == ".dxf"
         other = ", or in other units (--units)" if is_dxf else ""
         usual = f"{self.plan}: is it another building{other}?"
-        if math.isnan(self.first):
+        if self.first_scan is None:
             raise NothingFoundError(f"{self.log}: never located: {self.warning or usual}")
 
     def __str__(self) -> str:
-        first = f"located first after {self.first:.1f} s, lost {self.lost} times since"
+        first = f"located first in scan {self.first_scan}, after {self.first:.1f} s"
+        placed = f"{first}, lost {times(self.lost)} since"
         return (
             f"{self.log} on {self.plan} -> {self.output}\n"
             f"  {_shares(self.verdicts)}\n"
-            f"  {'never located' if math.isnan(self.first) else first}\n"
+            f"  {'never located' if self.first_scan is None else placed}\n"
             f"  {self.seconds:.2f} s, {self.scans / max(self.seconds, 1e-9):.0f} scans/s"
         )
 
@@ -168,7 +172,9 @@ def locate_log(
         if picture is not None:
             title = f"{Path(log.name).name} on {Path(plan).name}"
             draw([w for _, w in found], drawn, picture, title, _shares(verdicts))
-    stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
+    known = [bool(where) for _, where in found]
+    first_scan = known.index(True) if any(known) else None
+    stamps = [stamp for stamp, _ in found[: (first_scan or 0) + 1]]
     seconds, warning = time.perf_counter() - started, ""
     is_doubtful = sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf"
     if is_doubtful and (best := _units_that_fit(read, drawn, located)):
@@ -180,7 +186,8 @@ def locate_log(
         output=str(output),
         scans=len(found),
         verdicts=verdicts,
-        first=stamps[known.index(True)] - stamps[0] if any(known) else math.nan,
+        first_scan=first_scan,
+        first=math.nan if first_scan is None else _passed(stamps),
         lost=sum(was and not now for was, now in pairwise(known)),
         warning=warning,
         seconds=seconds,
@@ -205,11 +212,16 @@ def _units_that_fit(
     return best
 
 
+def _passed(stamps: list[float]) -> float:
+    """Return the time from the first to the last [s]; a clock that is set back takes none."""
+    return sum(max(after - before, 0.0) for before, after in pairwise(stamps))
+
+
 def _shares(verdicts: dict[str, int]) -> str:
     """Write how many scans there are, and the share of those with each verdict."""
     scans = sum(verdicts.values())
     shares = (f"{100 * n / scans:.1f} % {name}" for name, n in verdicts.items())
-    return f"{scans} scans: {', '.join(shares)}"
+    return f"{count(scans, 'scan')}: {', '.join(shares)}"
 
 
 def draw(

@@ -21,6 +21,7 @@ from ..mapping.grids import GRID_ENDINGS, all_files
 from ..mapping.making import make_map
 from ..mapping.sessions import Merged, merge_onto, onto_plan, placements
 from ..output import open_writer
+from ..output.canvas import count
 from ..output.figures import plot_walls
 from ..progress import Track, untracked
 from ..scan import Pose
@@ -56,16 +57,16 @@ class Mapping:
     merged: Merged | None = None
 
     def __str__(self) -> str:
-        times = "once" if self.lost == 1 else f"{self.lost} times"
-        lost = f", {times} lost" if self.lost else ""
+        lost = f", {times(self.lost)} lost" if self.lost else ""
         refused = f", {self.refused} refused" if self.refused else ""
         known = ", ".join(f"{deviation:.2g} m" for deviation in self.known)
         merged = "" if self.merged is None else f"  {self.merged}\n"
         each = " in each part" if len(self.known) > 1 else ""
         return (
             f"{self.log} -> {self.output}\n"
-            f"  {self.scans} scans, {self.frames} key frames, {sum(self.ways):.0f} m{lost}\n"
-            f"  {self.loops} loop{'s' * (self.loops != 1)}{refused}\n"
+            f"  {count(self.scans, 'scan')}, {count(self.frames, 'key frame')}, "
+            f"{sum(self.ways):.0f} m{lost}\n"
+            f"  {count(self.loops, 'loop')}{refused}\n"
             f"  by its covariances, places are known to {known}{each} from the start\n"
             f"{self._unsure()}"
             f"{merged}"
@@ -209,6 +210,11 @@ def map_log(
         located=made.located,
         merged=merged,
     )
+
+
+def times(number: int) -> str:
+    """Write how often: once, 2 times."""
+    return "once" if number == 1 else f"{number} times"
 
 
 @contextmanager

@@ -37,6 +37,8 @@ Records = NDArray[np.void]
 
 def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Records:
     """Make records of walls from both ends of each, shape (n, 2, 2)."""
+    if side not in (0, 1):
+        raise ValueError(f"side is {side!r}, expected 0 or 1")
     walls = np.zeros(len(ends), WALL)
     walls["start"], walls["end"], walls["centroid"] = ends[:, 0], ends[:, 1], ends.mean(axis=1)
     walls["angle"] = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1])
@@ -153,8 +155,11 @@ def bent(variance: Array | float, length: Array) -> Array:
 
 def rows_shaped(name: str, given: ArrayLike, *shapes: tuple[int, ...]) -> Array:
     """Return numbers of one of some shapes in each row; none is a row of nothing."""
-    rows = np.array(given, np.float64)
+    wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
+    try:
+        rows = np.array(given, np.float64)
+    except (TypeError, ValueError):  # a text, or rows that differ in length
+        raise ValueError(f"{name} are {given!r:.60}, expected numbers of shape {wanted}") from None
     if rows.size and rows.shape[1:] not in shapes:
-        wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
         raise ValueError(f"{name} have shape {rows.shape}, expected {wanted}")
     return rows.reshape(-1, *shapes[0])
