@@ -21,7 +21,7 @@ SETTINGS = {
     "parts": {"_LEAST": 5.0},
     "evidence": {"RIGHT_ON_MAP": (0.76, 0.13, 0.11), "WRONG_ON_MAP": (0.10, 0.42, 0.48),
                  "OF_MAPS": ((0.73, 0.15, 0.12), (0.33, 0.34, 0.33)), "DENSITY": 0.3},
-    "following": {"DENIED": (0.12, 0.0), "DENIED_ON_MAP": (0.3, -2.0), "SEEN": 1.0, "_TIGHT": 0.03},
+    "following": {"DENIED": (0.12, 0.0), "DENIED_ON_MAP": (0.3, -8.0), "SEEN": 1.0, "_TIGHT": 0.03},
     "hypotheses": {"ALIKE": np.radians(12), "OF_ENDS": 0.5, "LEAST_TURN": 0.3, "BOX": 0.6,
                    "TURN": np.radians(12)},
     "index": {"MAPPED": 0.045, "_CELL": 0.75, "_MOST_CELLS": 4_000_000},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
@@ -159,7 +160,8 @@ def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
     # `Limits` refuses what is no number.
-    found = {name: _literal(value) for name, value in _pairs(given).items()}
+    found: dict[str, Any] = dict(_pairs(given))
+    found |= {name: int(n) for name, n in found.items() if re.fullmatch(r"\d+(_\d+)*", n)}
     with wrong_usage():
         Limits.of(found)
     return found or None
