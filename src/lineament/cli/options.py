@@ -159,10 +159,9 @@ _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of t
 def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
-    # `Limits` refuses what is no number.
     found: dict[str, Any] = dict(_pairs(given))
     found |= {name: int(n) for name, n in found.items() if re.fullmatch(r"\d+(_\d+)*", n)}
-    with wrong_usage():
+    with wrong_usage():  # of what is no number, too
         Limits.of(found)
     return found or None
 
