@@ -45,6 +45,7 @@ def test_reports_worked_by_hand():
     report = counters.report(12.5, publishers=1, lost=4, unsent=5)
     assert (report.since, report.level) == ((1, 0, 0, 0, 0), 0)
     assert report.totals == "4 scans, 2 dropped, 4 lost, 1 malformed messages"
+    assert report.taken == "4 scans, 6 came too fast"
     counters.add(scan, features, 0.001)
     assert counters.report(13.0, publishers=1, lost=4, unsent=6).level == 1
     report = counters.report(13.5, publishers=0, lost=4, unsent=6)

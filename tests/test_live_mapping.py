@@ -205,6 +205,7 @@ def test_the_command_plays_a_log_and_saves_its_map(tmp_path):
     given = ["live", "--from", str(tmp_path / "log.npz"), "--rate", "0", "--ros", "0"]
     result = CliRunner().invoke(cli, [*given, "--mapping", str(target)])
     assert result.exit_code == 0, result.output
+    assert f"stopped: the map is made of {len(scans)} scans\n" in result.output
     assert "map.svg: LineMap(" in result.output
     live, whole = LineMap.read(target), tmp_path / "whole.svg"
     result = CliRunner().invoke(cli, ["map", str(tmp_path / "log.npz"), "-o", str(whole)])

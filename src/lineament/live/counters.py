@@ -96,6 +96,12 @@ class Report:
         """What happened since the start, in one line."""
         return f"{self.total.scans} scans, {_faults(self.total)} messages"
 
+    @property
+    def taken(self) -> str:
+        """The scans that were processed since the start, and whether others were missed."""
+        missed = self.total.dropped + self.total.lost
+        return f"{self.total.scans} scans" + (f", {missed} came too fast" if missed else "")
+
     def __str__(self) -> str:
         if not self.since.scans:
             return f"no scans, {self.publishers} publisher{'s' if self.publishers != 1 else ''}"

@@ -78,7 +78,7 @@ def run_live(
         if terminal.summary:
             write(terminal.summary)
         if config.mapping is not None:
-            write("stopped: the map is made of all scans")
+            write(f"stopped: the map is made of {report.taken}")
             write(pipeline.save())
         return report
 
