@@ -214,7 +214,7 @@ def _units_that_fit(
 
 def _passed(stamps: list[float]) -> float:
     """Return the time from the first to the last [s]; a clock that is set back takes none."""
-    return sum(max(after - before, 0.0) for before, after in pairwise(stamps))
+    return sum((max(after - before, 0.0) for before, after in pairwise(stamps)), start=0.0)
 
 
 def _shares(verdicts: dict[str, int]) -> str:
