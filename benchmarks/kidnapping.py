@@ -9,7 +9,8 @@ published after it and are wrong, by 0.3 m or 3°. The robot may have been put d
 scan: the first scan of the new place counts as one period after it.
 
 With ``--real``, real logs are followed on grids of maps of themselves, with their poses as
-odometry: as they are, and in pieces of 25 to 60 scans, each somewhere else.
+odometry: as they are, and in pieces of 25 to 60 scans, each somewhere else. With ``--agreement``,
+scans of real logs are compared with the next one, by the log's poses, and with one elsewhere.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -35,6 +37,7 @@ from lineament.live.plan_topics import statuses
 from lineament.live.received import LINKS, MOUNTINGS
 from lineament.logs import open_log
 from lineament.mapping import LineMap
+from lineament.mapping.consistency import agreement
 from lineament.mapping.following import Follower
 from lineament.rosmsg.poses import StampedPose
 from lineament.scan import LaserScan, Pose
@@ -185,6 +188,20 @@ def real(name: str) -> str:
     return "| " + " | ".join([*cells, f"{len(kidnapped)}", f"{noticed}", f"{honest}"]) + " |"
 
 
+def agreements(name: str) -> str:
+    """Return the row of a log: how scans agree with the next one, and with one elsewhere."""
+    scans = [scan for scan in open_log(DATA / LOGS[name]) if scan.pose is not None]
+    rng, right, elsewhere = np.random.default_rng(5), [], []
+    for before, scan in pairwise(scans):
+        if math.dist(before.pose[:2], scan.pose[:2]) < FAR:
+            right.append(agreement(before, scan, relative(before.pose, scan.pose)))
+        other = scans[int(rng.integers(len(scans)))]
+        if math.dist(before.pose[:2], other.pose[:2]) > FAR:
+            elsewhere.append(agreement(before, other, (0.05, 0.0, 0.02)))
+    shares = *np.nanquantile(right, (0.01, 0.5)), *np.nanquantile(elsewhere, (0.5, 0.99))
+    return f"| {name} | {len(right)} | " + " | ".join(f"{share:.2f}" for share in shares) + " |"
+
+
 def in_pieces(truth: list[Pose], rng: np.random.Generator) -> Iterator[tuple[int, bool]]:
     """Yield as many scans as there are, in pieces, and whether the robot was carried there."""
     k, left, last = 0, 0, None
@@ -208,7 +225,16 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--rate", type=float, default=5.0, help="scans a second")
     parser.add_argument("--real", action="store_true", help="real logs instead")
+    parser.add_argument("--agreement", action="store_true", help="scans of real logs, in pairs")
     options = parser.parse_args()
+    if options.agreement:
+        print(
+            "| log | pairs | right, 1 % | median | elsewhere, median | 99 % |\n"
+            "|---|--:|--:|--:|--:|--:|"
+        )
+        for name in LOGS:
+            print(agreements(name), flush=True)
+        return
     if options.real:
         print(
             "| log | located | wrong | carried: located | wrong | kidnapped | noticed at once "

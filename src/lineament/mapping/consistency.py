@@ -20,7 +20,12 @@ _MOST, _FEWEST = 180, 20
 
 
 def is_consistent(before: LaserScan, scan: LaserScan, motion: Pose) -> bool:
-    """Whether two scans may show the same place, the second one `motion` [m, m, rad] farther.
+    """Whether two scans may show the same place, the second one `motion` [m, m, rad] farther."""
+    return not agreement(before, scan, motion) < LEAST
+
+
+def agreement(before: LaserScan, scan: LaserScan, motion: Pose) -> float:
+    """Return the share of explained ends among those that both scans can see; NaN if they are few.
 
     The ends of the beams of each are seen from where the other was taken. One that is there where
     beams of that scan end is explained; one that is nearer is contradicted, as those beams went
@@ -33,7 +38,7 @@ def is_consistent(before: LaserScan, scan: LaserScan, motion: Pose) -> bool:
     seen_now = _count(_ends(some(old, _MOST), inverse(motion)), new, near, turned)
     explained, contradicted = seen_then[0] + seen_now[0], seen_then[1] + seen_now[1]
     seen = explained + contradicted
-    return seen < _FEWEST or explained >= LEAST * seen
+    return explained / seen if seen >= _FEWEST else math.nan
 
 
 def _by_bearing(scan: LaserScan) -> Array:
