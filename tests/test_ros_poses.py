@@ -297,6 +297,19 @@ def test_a_log_without_rings_and_echoes_says_so(tmp_path, option):
         assert len(open_log(path, **option)) == 1
 
 
+@pytest.mark.parametrize(
+    ("option", "line"),
+    [
+        ({"ring": 3}, r"log\.mcap: has no PointCloud2: ring changes nothing"),
+        ({"echo": "last"}, r"log\.mcap: has no MultiEchoLaserScan: echo changes nothing"),
+    ],
+)
+def test_a_bag_without_rings_or_echoes_says_so(tmp_path, option, line):
+    path = write(tmp_path, "mcap", lambda messages: scans(messages, 1.0))
+    with pytest.warns(LineamentWarning, match=line):
+        assert len(open_log(path, **option)) == 1
+
+
 def test_poses_of_motion_capture(data_dir):
     """The truth of this run was refined from them: they agree to centimetres."""
     topic = "/vrpn_client_node/jackal/pose"

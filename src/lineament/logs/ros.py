@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import LogError
-from ..rosmsg.scans import CLOUD, decoders
+from ..errors import LogError, one_line, warn
+from ..rosmsg.scans import CLOUD, MULTI_ECHO, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Log, Topic
@@ -43,6 +43,14 @@ class RosLog(Log):
         self._wanted = self.topics if self.topic is None else [self.topic]
         if not any(name in self.topics for name in self._wanted):
             raise self._no_scans()
+        # Of the whole bag, whatever the topic: of several scanners one may have rings.
+        for name, is_given, kind in (
+            ("echo", self.options.echo != "first", MULTI_ECHO),
+            ("ring", self.options.ring is not None, CLOUD),
+        ):
+            if is_given and not self._topics_of((kind,)):
+                short = kind.removeprefix("sensor_msgs/")
+                warn(one_line(f"{self.name}: has no {short}: {name} changes nothing"))
         self._pose_finder()
         self._overheard: Mapping[str, Container[str]] = {}
 

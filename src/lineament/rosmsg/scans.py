@@ -12,7 +12,7 @@ from ..limits import LIMITS, Limits
 from ..scan import LaserScan
 from .wire import Buffer, WireReader
 
-CLOUD = "sensor_msgs/PointCloud2"
+MULTI_ECHO, CLOUD = "sensor_msgs/MultiEchoLaserScan", "sensor_msgs/PointCloud2"
 #: Types of ``PointField``: those of numpy, by their number from 1.
 POINT_TYPES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _POINT_FIELDS = ("x", "y", "ring", "intensity")
@@ -27,7 +27,7 @@ def decoders(echo: str, ring: int | None, limits: Limits = LIMITS) -> dict[str, 
     """Return how to decode each type that carries scans; clouds only if `ring` is given."""
     known: dict[str, Decoder] = {
         "sensor_msgs/LaserScan": partial(laser_scan, limits=limits),
-        "sensor_msgs/MultiEchoLaserScan": partial(multi_echo_scan, echo=echo, limits=limits),
+        MULTI_ECHO: partial(multi_echo_scan, echo=echo, limits=limits),
     }
     cloud = partial(ring_scan, ring=ring or 0, limits=limits)
     return known if ring is None else {**known, CLOUD: cloud}
