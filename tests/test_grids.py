@@ -3,6 +3,7 @@
 import math
 import os
 import re
+import sys
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -281,6 +282,16 @@ def test_flat_yaml_is_read_as_yaml(text, fields):
             assert [float(part) for part in fields[name].split(",")] == [float(v) for v in value]
         else:
             assert str(value) == fields[name]
+
+
+def test_an_image_may_have_a_name_that_is_not_utf_8(tmp_path):
+    path = written(tmp_path, np.full((3, 3), 254))
+    path.write_bytes(YAML.encode().replace(b"a.pgm", b"\xe9.pgm"))
+    with pytest.raises(ln.LineamentError, match=r"a\.yaml: \\udce9\.pgm: No such file"):
+        Grid.read(path)
+    if sys.platform == "linux":
+        (tmp_path / "a.pgm").rename(tmp_path / "\udce9.pgm")
+        assert Grid.read(path).cells.shape == (3, 3)
 
 
 def replaced(old, new):

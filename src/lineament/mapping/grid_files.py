@@ -46,10 +46,12 @@ def read_about(path: str | os.PathLike[str], limits: Limits) -> About:
     error = plan_error(path)
     check_file(path, limits)
     try:
-        return _checked(_DEFAULTS | parse_flat(Path(path).read_text(encoding="utf-8-sig")))
+        # Names of files need not be UTF-8: other bytes are kept, as the system has them.
+        text = Path(path).read_text(encoding="utf-8-sig", errors="surrogateescape")
+        return _checked(_DEFAULTS | parse_flat(text))
     except OSError as problem:
         raise error(problem.strerror or "cannot be read") from None
-    except ValueError as problem:  # a UnicodeDecodeError is one
+    except ValueError as problem:
         raise error(f"is no grid of map_server: {problem}") from None
 
 
