@@ -342,7 +342,7 @@ def test_no_feature_is_status_3(capsys, target):
 def test_no_wall_is_status_3(files, refused):
     save_log("bare.log", [sparse(k) for k in range(3)])
     line = refused("map bare.log -o a.svg --poses a.tum -q", 3)
-    assert line == "lineament: no walls are seen in 3 key frames, expected some"
+    assert line == "lineament: bare.log: no walls are seen in 3 key frames, expected some"
     assert not set(names_of(files)) & {"a.svg", "a.tum"}
 
 

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import LogError, needed_by
+from ..errors import LineamentError, LogError, needed_by, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, naming_errors, written_beside
 from ..logs import open_log
@@ -182,11 +182,15 @@ def map_log(
         stamps.append(scan.stamp)
     if not stamps:
         raise LogError(log.name, "has no scans, expected a drive")
-    made, merged = make_map(drive.frames, drive.scans), None
-    if plan is not None:
-        found = placements(made, plan)
-        merged = merge_onto(made, plan, found) if merge else None
-        made = onto_plan(made, plan, found) if merged is None else merged.made
+    merged = None
+    try:
+        made = make_map(drive.frames, drive.scans)
+        if plan is not None:
+            found = placements(made, plan)
+            merged = merge_onto(made, plan, found) if merge else None
+            made = onto_plan(made, plan, found) if merged is None else merged.made
+    except LineamentError as error:
+        raise type(error)(one_line(f"{log.name}: {error}")) from None
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
     with placed:  # All files, or none.
         made.write(output)
