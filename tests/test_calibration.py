@@ -240,6 +240,15 @@ def test_logs_that_cannot_be_used_are_one_line(scans, tmp_path, change, problem)
         calibrate_log(tmp_path / "log.npz", deskewed=False)
 
 
+def test_a_clock_that_is_set_back_changes_no_way(scans, tmp_path):
+    ways = []
+    for back in (0, 5 * 10**9):
+        set_back = (scan.stamped("first", scan.stamp_ns - back) for scan in scans[60:])
+        save_npz(tmp_path / "log.npz", [*scans[:60], *set_back])
+        ways.append(calibrate_log(tmp_path / "log.npz", deskewed=False).way)
+    assert ways[1] == pytest.approx(ways[0])
+
+
 def test_a_scanner_that_stands_is_one_line(scans, tmp_path, refused):
     stands = [scans[0].stamped("first", k * 10**8) for k in range(10)]
     save_npz(tmp_path / "log.npz", stands)

@@ -162,6 +162,7 @@ def calibrate_log(
         if against == log.topic:
             raise LogError(log.name, f"--against {against} is the scanner itself")
         _, others = _read(path, {**reading, "topic": against})
+        others.sort(key=lambda scan: scan.stamp)  # Times are looked up among theirs.
         other_features = _features(others, extractor, deskewed=deskewed)
         carried = Carried.of(other_features, roughness)
         poses = [carried.at(scan.stamp) for scan in scans]
@@ -197,9 +198,9 @@ def calibrate_log(
 
 
 def _read(path: str | os.PathLike[str], reading: dict[str, Any]) -> tuple[Log, list[LaserScan]]:
-    """Read the scans of a topic, with poses as the log has them."""
+    """Read the scans of a topic in the order of the log, with poses as it has them."""
     log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
-    scans = sorted(one_scanner(log, odometry=False), key=lambda scan: scan.stamp)
+    scans = list(one_scanner(log, odometry=False))
     if len(scans) > 1 and len({scan.stamp for scan in scans}) == 1:
         stamp = scans[0].stamp
         raise LogError(log.name, f"all stamps are {stamp}, expected stamps that increase")
