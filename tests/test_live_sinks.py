@@ -73,6 +73,14 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
     }
 
 
+def test_a_log_on_a_plan_has_one_writer_of_transforms(plan, monkeypatch):
+    opened, taken = [], Taken()
+    monkeypatch.setattr(taken, "_open", lambda topic, _: opened.append(topic) or topic)
+    RosSink(taken, RosMessages("cdr"), LiveConfig(log="a.log", map=plan))
+    assert "/tf" in opened
+    assert len(opened) == len({*opened})
+
+
 def test_foxglove_draws_the_plan_in_grey(plan):
     messages = FoxgloveMessages()
     given = recorded(messages, "features")

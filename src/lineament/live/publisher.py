@@ -18,8 +18,11 @@ class Publisher(ABC):
     def advertise(self, topic: str, kind: str, *, is_latched: bool = False) -> None:
         """Announce a topic, so that others can subscribe before there is a message.
 
-        Who comes later gets the last message of one that is latched.
+        Who comes later gets the last message of one that is latched. Once is enough: a scan of a
+        log and a pose on a plan share ``/tf``.
         """
+        if topic in self._topics:
+            return
         if is_latched:
             self._latched.add(topic)
         self._topics[topic] = self._open(topic, kind)
