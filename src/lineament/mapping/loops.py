@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..scan import Array, Pose
 from ..scan.poses import relative
-from ..walls import Records, moved
+from ..walls import Numbers, Records, moved
 from ..walls.sights import walls_along
 from .adjust import edges_of
 from .drive_map import KeyFrame
@@ -67,9 +67,13 @@ class Survey:
         blocks[np.arange(n), :, np.arange(n)] = walls["covariance"]
         return Query(walls, blocks.reshape(2 * n, 2 * n), thinned(np.concatenate(beams)))
 
-    def queries(self, every: float) -> Iterator[tuple[int, Query]]:
-        """Return the first key frame of each so many metres, and what was seen before it."""
-        for q in np.flatnonzero(np.diff(np.floor(self.way / every), prepend=-1)).tolist():
+    def queries(self, every: float, frames: Numbers | None = None) -> Iterator[tuple[int, Query]]:
+        """Return the first key frame of each so many metres, and what was seen before it.
+
+        Of some `frames` alone, if they are given.
+        """
+        chosen = np.flatnonzero(np.diff(np.floor(self.way / every), prepend=-1))
+        for q in (chosen if frames is None else np.intersect1d(chosen, frames)).tolist():
             query = self.query(q)
             if query is not None:
                 yield q, query

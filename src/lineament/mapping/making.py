@@ -3,7 +3,7 @@
 import math
 import os
 from dataclasses import dataclass
-from itertools import compress, pairwise
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,10 @@ from .believed import believed
 from .drive_map import UNKNOWN, KeyFrame
 from .grids import GRID_ENDINGS
 from .index import MAPPED
+from .joining import closed, count_of
 from .line_map import LineMap
 from .loops import Survey
 from .parts import Parts, apart, parts_of
-from .placing import placed_on
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -30,8 +30,6 @@ _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
 TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
-#: Where loops are looked for at first, and once they are closed [m, rad].
-_SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Surfaces that are so much off a common line are one wall [m].
 APART = 0.015
 #: A wall was seen by so many key frames.
@@ -130,12 +128,12 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
         raise NothingFoundError(f"no walls are seen in {len(frames)} key frames, expected some")
-    lines = lines_of(sights, poses, _count(sights))
+    lines = lines_of(sights, poses, count_of(sights))
     frames = believed(Survey(frames, poses, sights, lines))
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
     spreads = [spread_of(frame) for frame in frames[1:]]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
-    found = optimise(poses, chain, sights, _count(sights))
+    found = optimise(poses, chain, sights, count_of(sights))
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
     found, loops, refused = closed(frames, chain, found, sights)
@@ -143,7 +141,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         weak = loops.copy()
         weak["information"] /= TWICE
         weak["loop"] = False
-        found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
+        found = optimise(found.poses, np.append(chain, weak), sights, count_of(sights), rounds=2)
     parts = parts_of(found, chain, np.array([f.is_lost or f.is_contradicted for f in frames]))
     found, chain, sights = apart(found, chain, sights, parts)
     if len(loops):
@@ -152,7 +150,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     bent = [(widened(segments), walls) for segments, walls in seen]
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
-    found = optimise(found.poses, chain, sights, _count(sights), held=parts.roots, rounds=2)
+    found = optimise(found.poses, chain, sights, count_of(sights), held=parts.roots, rounds=2)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights))
     walls = walls_by_part(survey, parts)
     frame_of = np.array([k for k, _ in scans], np.int64)
@@ -187,23 +185,6 @@ def spread_of(frame: KeyFrame) -> Array:
         return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
     known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(frame.expected)
     return np.asarray(np.linalg.inv(known) + _LEAST)
-
-
-def closed(
-    frames: list[KeyFrame], chain: Records, found: Adjusted, sights: Records
-) -> tuple[Adjusted, Records, Records]:
-    """Return the poses with their loops closed, these loops, and those that contradict them."""
-    loops = refused = edges_of([], [], [])
-    for k, spread in enumerate(_SPREADS):
-        if k:
-            found.poses = joined(Survey(frames, found.poses, sights, found.lines))
-            found.lines = lines_of(sights, found.poses, _count(sights))
-        near = Survey(frames, found.poses, sights, found.lines).loops(spread)
-        if len(near):
-            found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
-            right = found.weights[len(chain) :] > 0.5
-            loops, refused = near[right], near[~right]
-    return found, loops, refused
 
 
 def widened(segments: Records) -> Records:
@@ -244,10 +225,6 @@ def single(walls: Records) -> Records:
     return kept
 
 
-def _count(sights: Records) -> int:
-    return int(sights["wall"].max()) + 1
-
-
 def relabelled(sights: Records, like: Records) -> Records:
     """Return the sights with the walls of others, of the same segments."""
     sights["wall"] = like["wall"]
@@ -265,24 +242,9 @@ def roughness(sights: Records, poses: Array, before: float) -> float:
     often = views >= _OFTEN
     if not often.any():
         return before
-    off = errors(sights, poses, lines_of(sights, poses, _count(sights)))[0][often, 0]
+    off = errors(sights, poses, lines_of(sights, poses, count_of(sights)))[0][often, 0]
     squares = off**2 / (1 - 1 / views[often])
     own = sights["covariance"][often, 0, 0] - before**2
     tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
     right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
     return next(right, _ROUGHEST)
-
-
-def joined(survey: Survey) -> Array:
-    """Return the poses, with what follows each lost key frame put where it was seen before."""
-    frames, poses, sights = survey.frames, survey.poses.copy(), survey.sights
-    lost = [k for k, frame in enumerate(frames) if frame.is_torn]
-    for first, last in pairwise([*lost, len(frames)]):
-        lines = lines_of(sights, poses, _count(sights))
-        before = Survey(frames, poses, sights, lines).walls((0.0, 0.0, 0.0), np.arange(first))
-        if len(before):
-            part = Survey(frames[:last], poses[:last], sights, lines)
-            found = placed_on(LineMap(before), part, np.arange(first, last))
-            if found is not None:
-                poses[first:] = [compose(found.move, tuple(of)) for of in poses[first:].tolist()]
-    return poses
