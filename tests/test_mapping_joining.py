@@ -3,10 +3,13 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from lineament.mapping import joining
 from lineament.mapping.adjust import edges_of, optimise
-from lineament.mapping.joining import _agreeing, _ties
+from lineament.mapping.joining import _agreeing, _ties, joined
 from lineament.mapping.loops import FLOOR, Survey
+from lineament.walls.sights import SIGHT
 
 
 def test_places_agree_as_far_as_the_way_between_them_is_known():
@@ -26,6 +29,34 @@ def test_places_agree_as_far_as_the_way_between_them_is_known():
     assert _agreeing(places, found)[0] == [0, 2, 3]
     assert _agreeing({}, found) == ([], 0)
     assert _agreeing({4: places[5]}, found) == ([4], 0)
+
+
+@pytest.mark.parametrize(("agree", "others", "moves"), [(1, 0, 0), (2, 0, 1), (2, 1, 0), (3, 1, 1)])
+@pytest.mark.parametrize("is_late", [False, True])
+def test_what_follows_a_lost_key_frame_goes_where_enough_places_agree(
+    monkeypatch, agree, others, moves, is_late
+):
+    """By 3 m to the left. If they are seen later alone, that is what is looked for at last."""
+    poses = np.column_stack((np.arange(14.0), np.zeros((14, 2))))
+    lost = [6, 12] if is_late else [6]
+    frames = [SimpleNamespace(is_torn=k in lost) for k in range(14)]
+    sure, loose = np.eye(3) * 1e-4, np.diag((10.0, 10.0, 1.0)) ** 2
+    spreads = [loose if k + 1 in lost else sure for k in range(13)]
+    chain = edges_of([(k, k + 1) for k in range(13)], [(1.0, 0, 0)] * 13, spreads)
+
+    def located(_, here, rest):
+        if here[0] != 6 or (is_late and 13 not in rest):
+            return {}
+        found = {q: (float(q), 3.0, 0.0) for q in range(6, 6 + agree)}
+        found |= {10 + k: (9.0, -7.0, 1.0) for k in range(others)}
+        return {q: SimpleNamespace(pose=pose, covariance=sure) for q, pose in found.items()}
+
+    monkeypatch.setattr(joining, "_located", located)
+    monkeypatch.setattr(joining, "count_of", len)
+    found = joined(frames, optimise(poses, chain), chain, np.zeros(0, SIGHT))
+    left = found.poses[:, 1]
+    np.testing.assert_allclose(left[:6], 0.0, atol=0.1)
+    np.testing.assert_allclose(left[6:12], 3.0 * moves, atol=0.1)
 
 
 def test_a_place_is_tied_to_the_nearest_key_frame_before():

@@ -49,8 +49,10 @@ def test_a_query_is_of_the_last_five_metres(survey, q, first):
 
 def test_queries_are_so_far_apart(survey):
     """The first key frame, and each that is the first past another so many metres."""
-    assert [q for q, _ in survey.queries(2.0)] == [0, *range(4, 25, 4)]
-    assert [q for q, _ in survey.queries(3.0)] == [0, 6, 12, 18, 24]
+    every = np.arange(len(survey.frames))
+    assert [q for q, _ in survey.queries(2.0, every)] == [0, *range(4, 25, 4)]
+    assert [q for q, _ in survey.queries(3.0, every)] == [0, 6, 12, 18, 24]
+    assert [q for q, _ in survey.queries(3.0, every[7:19])] == [12, 18]
 
 
 def test_what_shows_fewer_than_four_walls_is_not_looked_for(survey):

@@ -19,8 +19,8 @@ _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Places agree if they are off the way between them by less, squared over its covariance and over
 #: that of a map that is not adjusted yet [m, m, rad].
 _AGREE, _BENT = 16.0, np.diag((0.1, 0.1, 0.02)) ** 2
-#: So many places agree at least, and so many times as many as are located elsewhere: in one log a
-#: place is located that looks alike, once in a while, and puts what follows there.
+#: So many places agree at least, and so many times as many as are located elsewhere. One alone may
+#: be a place that looks alike.
 _FEWEST, _MORE = 2, 3
 
 
@@ -49,16 +49,16 @@ def joined(frames: list[KeyFrame], found: Adjusted, edges: Records, sights: Reco
     every = np.arange(len(frames))
     lost = [k for k, frame in enumerate(frames) if frame.is_torn]
     spans = list(pairwise([*lost, len(frames)]))
-    for is_last in (False, True):
+    for is_again in (False, True):
         for first, last in spans.copy():
             survey, here = Survey(frames, found.poses, sights, found.lines), every[first:last]
-            rest = np.setdiff1d(every, here) if is_last else every[:first]
+            rest = np.setdiff1d(every, here) if is_again else every[:first]
             places = _located(survey, here, rest)
             chosen, at = _agreeing(places, found)
             if len(chosen) >= max(_FEWEST, _MORE * (len(places) - len(chosen))):
                 q = list(places)[at]
                 move = compose(places[q].pose, inverse(survey.pose(q)))
-                moved = here if is_last else every[first:]
+                moved = here if is_again else every[first:]
                 poses = found.poses.copy()
                 poses[moved] = [compose(move, survey.pose(k)) for k in moved.tolist()]
                 edges = np.append(edges, _ties(survey, {q: places[q] for q in chosen}, rest))
@@ -68,7 +68,7 @@ def joined(frames: list[KeyFrame], found: Adjusted, edges: Records, sights: Reco
 
 
 def _located(survey: Survey, frames: Numbers, others: Numbers) -> dict[int, Location]:
-    """Find the key frames that are located on the walls that others have seen."""
+    """Return the key frames that are located on the walls that others see."""
     walls = survey.walls((0.0, 0.0, 0.0), others)
     if not len(walls):
         return {}

@@ -67,13 +67,13 @@ class Survey:
         blocks[np.arange(n), :, np.arange(n)] = walls["covariance"]
         return Query(walls, blocks.reshape(2 * n, 2 * n), thinned(np.concatenate(beams)))
 
-    def queries(self, every: float, frames: Numbers | None = None) -> Iterator[tuple[int, Query]]:
-        """Return the first key frame of each so many metres, and what was seen before it.
+    def queries(self, every: float, frames: Numbers) -> Iterator[tuple[int, Query]]:
+        """Return those of some key frames that are the first of each so many metres of the way.
 
-        Of some `frames` alone, if they are given.
+        With each comes what was seen before it.
         """
-        chosen = np.flatnonzero(np.diff(np.floor(self.way / every), prepend=-1))
-        for q in (chosen if frames is None else np.intersect1d(chosen, frames)).tolist():
+        first = np.flatnonzero(np.diff(np.floor(self.way / every), prepend=-1))
+        for q in np.intersect1d(first, frames).tolist():
             query = self.query(q)
             if query is not None:
                 yield q, query
@@ -86,7 +86,7 @@ class Survey:
         ends, motions, spreads, way = [], [], [], self.way
         covariance = np.diag((spread[0], *spread)) ** 2
         plans: dict[int, LineMap | None] = {}
-        for q, query in self.queries(_EVERY):
+        for q, query in self.queries(_EVERY, np.arange(len(way))):
             for j in self._passed(q, 2.0 + 2.0 * spread[0]):
                 if j not in plans:
                     walls = self.walls(self.pose(j), np.flatnonzero(abs(way - way[j]) <= _PLAN))

@@ -46,11 +46,10 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
         return None
     (way, turn), against = _NEAR, []
     spread = np.diag((way + known, way + known, turn)) ** 2
-    for q, query in survey.queries(PLACES):
-        if q in frames:
-            where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
-            is_through = where.evidence.contradicted > MOST_CONTRADICTED
-            against.append(is_through and q not in found.places)
+    for q, query in survey.queries(PLACES, frames):
+        where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
+        is_through = where.evidence.contradicted > MOST_CONTRADICTED
+        against.append(is_through and q not in found.places)
     return found if np.mean(against) <= _LOOK_THROUGH else None
 
 
@@ -59,18 +58,14 @@ def is_enough(agree: int, others: int) -> bool:
     return agree >= max(FEWEST, _MORE * others)
 
 
-def placed_on(
-    plan: LineMap, survey: Survey, frames: Numbers, known: float = 0.0
-) -> Placement | None:
+def placed_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> Placement | None:
     """Find the motion that puts some key frames where the plan shows what they saw.
 
     Places along the way are looked for without a first guess; most of those that are located agree
     on it, as far as they are `known` to each other (one deviation [m]). None if none is located.
     """
-    places = {}
-    for q, query in survey.queries(PLACES):
-        if q in frames and (where := locate(query, plan)):
-            places[q] = where
+    every = ((q, locate(query, plan)) for q, query in survey.queries(PLACES, frames))
+    places = {q: where for q, where in every if where}
     if not places:
         return None
     moves = [compose(where.pose, inverse(survey.pose(q))) for q, where in places.items()]
