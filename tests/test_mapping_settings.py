@@ -22,6 +22,7 @@ SETTINGS = {
     "evidence": {"RIGHT_ON_MAP": (0.76, 0.13, 0.11), "WRONG_ON_MAP": (0.10, 0.42, 0.48),
                  "OF_MAPS": ((0.73, 0.15, 0.12), (0.33, 0.34, 0.33)), "DENSITY": 0.3},
     "following": {"DENIED": (0.12, 0.0), "DENIED_ON_MAP": (0.3, -8.0), "SEEN": 1.0, "_TIGHT": 0.03},
+    "gone": {"_PIECE": 0.5, "_BEAMS": 360, "_THROUGH": 2},
     "hypotheses": {"ALIKE": np.radians(12), "OF_ENDS": 0.5, "LEAST_TURN": 0.3, "BOX": 0.6,
                    "TURN": np.radians(12)},
     "index": {"MAPPED": 0.045, "_CELL": 0.75, "_MOST_CELLS": 4_000_000},
@@ -36,7 +37,7 @@ SETTINGS = {
     "placing": {"PLACES": 3.0, "_AGREE": (0.5, 0.05), "_OFF": 3.0, "_NEAR": (0.2, 0.05),
                 "_LOOK_THROUGH": 0.4, "FEWEST": 3, "_MORE": 3},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
-    "sessions": {"_ROUNDS": 3, "_PIECE": 0.5, "_BEAMS": 360, "_ALONG": 0.7, "_THROUGH": 2},
+    "sessions": {"_ROUNDS": 3, "_ALONG": 0.7},
     "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
 }  # fmt: skip
 

@@ -13,8 +13,6 @@ from lineament.mapping.index import MAPPED
 from lineament.mapping.sessions import (
     _add_common,
     _again,
-    _covering,
-    _pieces,
     _seen_before,
     placements,
 )
@@ -157,19 +155,6 @@ def test_parts_that_are_not_on_the_plan_are_named():
     assert Mapping(ways=[30.0, 8.0], located=(0, 1), **about).warning == ""
     assert Mapping(ways=[30.0], **about).warning == ""
     assert "in 2 parts" in Mapping(ways=[30.0, 8.0], **about).warning
-
-
-def test_pieces_lie_along_their_walls():
-    pieces, of = _pieces(walls_of(np.array([[(0, 0), (1.2, 0)], [(0, 0), (0, 0.4)]])))
-    assert of.tolist() == [0, 0, 0, 1]
-    np.testing.assert_allclose(pieces["start"], [(0, 0), (0.4, 0), (0.8, 0), (0, 0)])
-    np.testing.assert_allclose(pieces["end"], [(0.4, 0), (0.8, 0), (1.2, 0), (0, 0.4)])
-
-
-def test_sights_cover_places_of_their_wall_alone():
-    spans = np.array([3, 3, 4]), np.array([-1.0, 0.0, 0.0]), np.array([1.0, 2.0, 9.0])
-    walls, along = np.array([3, 3, 3, 4, 5, -1]), np.array([-0.5, 0.5, 5.0, 5.0, 5.0, 0.5])
-    assert _covering(spans, walls, along).tolist() == [1, 2, 0, 1, 0, 0]
 
 
 def test_of_a_wall_seen_from_either_side_one_is_enough():

@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
 
@@ -12,10 +12,11 @@ from ..errors import NothingFoundError
 from ..scan import Array, Pose
 from ..scan.poses import compose
 from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
-from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
+from ..walls.sights import errors, lines_of, merged, on_lines, sights_of
 from .adjust import Adjusted, edges_of, optimise
 from .believed import believed
 from .drive_map import UNKNOWN, KeyFrame
+from .gone import standing
 from .grids import GRID_ENDINGS
 from .index import MAPPED
 from .joining import closed, count_of
@@ -163,11 +164,11 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
 def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
     """Return the walls of each part; NothingFoundError if there are none."""
     sights, least = survey.sights, min(VIEWS, len(survey.frames))
-    of = parts.numbers[sights["frame"]]
-    walls = [
-        single(walls_along(sights[of == k], survey.poses, survey.lines, views=least))
-        for k in range(parts.count)
-    ]
+    of, walls = parts.numbers[sights["frame"]], []
+    for k in range(parts.count):
+        own = replace(survey, sights=sights[of == k])
+        runs = standing(own, least, parts.is_sure & (parts.numbers == k))
+        walls.append(single(on_lines(own.lines, *runs)))
     if not any(map(len, walls)):
         raise NothingFoundError(f"no wall is seen by {least} of {len(survey.frames)} key frames")
     return walls

@@ -20,12 +20,11 @@ from ..walls import (
     turned_back,
     unit,
 )
-from ..walls.sights import extents, joined, on_lines, sights_of, stretches
+from ..walls.sights import joined, on_lines, sights_of, stretches
 from .adjust import Adjusted, edges_of, optimise
-from .drive_map import passed
+from .gone import along_lines, keys_of, looked_through, pieces_of, standing
 from .index import MAPPED
 from .line_map import LineMap
-from .local_map import beams_of, some
 from .loops import FLOOR, Survey
 from .making import APART, TWICE, VIEWS, DriveMap, single
 from .parts import beside, boxes_of
@@ -33,12 +32,8 @@ from .placing import FEWEST, PLACES, Placement, is_enough, surely_on
 
 #: Walls that are one are looked for so often, poses and walls adjusted in between.
 _ROUNDS = 3
-#: Walls of a plan are looked through by pieces so long [m]; by so many beams of a key frame.
-_PIECE, _BEAMS = 0.5, 360
 #: Walls along each other (45°); others are farther than any [m].
 _ALONG, _FAR = 0.7, 1e6
-#: A piece is gone if at least so many key frames look through it, and more than see it.
-_THROUGH = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,16 +206,13 @@ def _united(
     The last pose of the survey is that of the plan; `label` is the line of each old wall.
     """
     is_new = survey.sights["frame"] < len(survey.frames)
-    low, high = (of[is_new] for of in extents(survey.sights, survey.poses, survey.lines))
-    w, views = survey.sights["wall"][is_new], min(VIEWS, len(survey.frames))
-    new, begin, end, counts = stretches(w, low, high, views=views)
+    own = replace(survey, sights=survey.sights[is_new])
+    new, begin, end, counts = standing(own, min(VIEWS, len(own.frames)), is_sure)
     is_again = np.isin(label, new)
     is_left, either = _again(old, is_again)
-    pieces, of = _pieces(old)
-    along = _along(survey.lines[label[of]], pieces)
-    through = _looked_through(survey, pieces, is_sure)
-    sees = _covering((w, low, high), label[of], along.mean(axis=1))
-    is_gone = (through >= _THROUGH) & (through > sees)
+    pieces, of = pieces_of(old)
+    along = along_lines(survey.lines[label[of]], pieces)
+    is_gone = looked_through(own, pieces, label[of], is_sure)
     both, left = is_again[of] & ~is_gone, is_left[of] & ~is_gone
     # Where both saw a wall, it goes as far as either did.
     at, first, last, _ = stretches(
@@ -229,9 +221,11 @@ def _united(
         np.append(end, along[both, 1]),
     )
     seen = np.zeros(len(at), np.int64)
-    np.add.at(seen, np.searchsorted(_keys(at, first), _keys(new, begin), side="right") - 1, counts)
+    np.add.at(
+        seen, np.searchsorted(keys_of(at, first), keys_of(new, begin), side="right") - 1, counts
+    )
     walls = on_lines(survey.lines, at, first, last, np.maximum(seen, 1))
-    by_wall = _along(old[of], pieces)[left]
+    by_wall = along_lines(old[of], pieces)[left]
     at, first, last, _ = stretches(of[left], by_wall[:, 0], by_wall[:, 1], gap=1e-6)
     rest = on_lines(old, at, first, last, old["views"][at])
     rest["side"] = old["side"][at]
@@ -252,45 +246,3 @@ def _again(old: Records, is_again: NDArray[np.bool_]) -> tuple[NDArray[np.bool_]
     either[is_both[:m]] |= is_again[m:]
     is_left[:m] = ~either
     return is_left, int(either.sum())
-
-
-def _along(lines: Records, pieces: Records) -> Array:
-    """Return where pieces begin and end along lines, one for each, from their centroids on [m]."""
-    arms = np.stack((pieces["start"], pieces["end"]), axis=1) - lines["centroid"][:, None]
-    return np.asarray((arms * unit(lines["angle"])[:, None]).sum(axis=2))
-
-
-def _pieces(walls: Records) -> tuple[Records, Numbers]:
-    """Return pieces of walls, along each, and the number of the wall of each."""
-    counts = np.maximum(np.ceil(lengths_of(walls) / _PIECE), 1).astype(np.int64)
-    of = np.repeat(np.arange(len(walls)), counts)
-    k = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
-    pieces, along = walls[of], walls["end"][of] - walls["start"][of]
-    for name, at in (("start", k), ("end", k + 1)):
-        pieces[name] = walls["start"][of] + (at / counts[of])[:, None] * along
-    return pieces, of
-
-
-def _looked_through(survey: Survey, pieces: Records, is_sure: NDArray[np.bool_]) -> Numbers:
-    """Return how many key frames whose poses are sure look through each piece."""
-    counts, is_both = np.zeros(len(pieces), np.int64), pieces["side"] == 0
-    for k in np.flatnonzero(is_sure).tolist():
-        frame, here = survey.frames[k], moved(pieces, survey.pose(k))
-        beams = some(beams_of(frame.features, frame.scan), _BEAMS)
-        (x, y), (to_x, to_y) = here["start"].T, here["end"].T
-        is_back = x * to_y <= y * to_x  # seen from its right: no beam of this frame is for it
-        here[is_back & is_both] = turned_back(here[is_back & is_both])
-        counts += passed(here, beams) & (~is_back | is_both)
-    return counts
-
-
-def _covering(spans: tuple[Numbers, Array, Array], walls: Numbers, along: Array) -> Numbers:
-    """Return how many sights of walls w, from low to high, cover places along walls."""
-    w, *tips = spans
-    before = [np.searchsorted(np.sort(_keys(w, of)), _keys(walls, along)) for of in tips]
-    return before[0] - before[1]
-
-
-def _keys(w: Numbers, along: Array) -> Array:
-    """Return numbers in the order of walls, and of places along each [m]."""
-    return np.asarray(1e5 * w + along)
