@@ -3,8 +3,9 @@
 Each log is mapped with its corrected poses as odometry; local maps of 5 m of way, one each 1.3 m,
 are looked for without a guess on the map of the whole log, on that of its even scans alone, and on
 the map of another log, which shows another building. A place is right within 0.3 m and 3° of where
-the same log's poses put it. ``--fit`` counts instead what `lineament.mapping.evidence` has as
-`OF_MAPS`, by the first halves of three logs.
+the log's poses put it beside the nearest scan of the map: parts of a map may show the same rooms.
+``--fit`` counts instead what `lineament.mapping.evidence` has of maps, by the first halves of three
+logs.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ import lineament as ln
 from lineament.logs import open_log
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.evidence import OF_MAPS
+from lineament.mapping.evidence import OF_MAPS, RIGHT_ON_MAP, WRONG_ON_MAP, evidence_of
+from lineament.mapping.locate import _TIGHT as TIGHT
+from lineament.mapping.locate import _tried
 from lineament.mapping.making import make_map
+from lineament.scan import Pose
 from lineament.scan.poses import compose, relative
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
@@ -42,32 +46,47 @@ FITTED = "ACES", "fr079", "CSAIL"
 WAY, STEP, GAP = 5.0, 1.3, 2.0
 #: A place is right within [m, rad].
 RIGHT = 0.3, math.radians(3)
+#: A pose that is farther from a place is elsewhere [m].
+ELSEWHERE = 1.0
 
 
 class Place(NamedTuple):
-    """What is looked for, and where it is on the map of the whole log, and of half of it."""
+    """What is looked for, and where it is by its log."""
 
     query: Query
-    whole: tuple[float, float, float]
-    half: tuple[float, float, float]
+    pose: Pose
 
 
-def mapped(scans: list[ln.LaserScan]) -> tuple[LineMap, list[tuple[float, float, float]]]:
-    """Return the map of scans, and their poses on it."""
+class Mapped(NamedTuple):
+    """A map, and the poses of its scans: on it, and by its log."""
+
+    plan: LineMap
+    poses: list[Pose]
+    logged: list[Pose]
+
+    def expected(self, place: Place, found: Pose) -> Pose:
+        """Return where a place is on the map, beside the scan that is nearest to a pose found."""
+        k = nearest(self.poses, found)
+        return compose(self.poses[k], relative(self.logged[k], place.pose))
+
+
+def nearest(poses: list[Pose], to: Pose) -> int:
+    return int(np.hypot(*(np.array(poses)[:, :2] - to[:2]).T).argmin())
+
+
+def mapped(scans: list[ln.LaserScan]) -> Mapped:
     drive, extract = Drive(), ln.Extractor()
     for scan in scans:
         drive.add(scan, extract(scan), scan.pose)
     made = make_map(drive.frames, drive.scans)
-    return made.map, made.poses
+    return Mapped(made.map, made.poses, [scan.pose for scan in scans])
 
 
-def surveyed(scans: list[ln.LaserScan]) -> tuple[LineMap, LineMap, list[Place]]:
+def surveyed(scans: list[ln.LaserScan]) -> tuple[Mapped, Mapped, list[Place]]:
     """Return the maps of a whole log and of its even scans, and its places."""
-    whole, at = mapped(scans)
-    half, of_even = mapped(scans[::2])
     extract, found, since, last = ln.Extractor(), [], 0.0, scans[0].pose
     tracker, local = ln.Tracker(), LocalMap(WAY)
-    for k, scan in enumerate(scans):
+    for scan in scans:
         way = math.dist(scan.pose[:2], last[:2])
         if way > GAP:
             tracker, local, since = ln.Tracker(), LocalMap(WAY), 0.0
@@ -76,38 +95,36 @@ def surveyed(scans: list[ln.LaserScan]) -> tuple[LineMap, LineMap, list[Place]]:
         since, last = since + min(way, GAP), scan.pose
         if since > STEP and local.way_seen > 2.0:
             since = 0.0
-            beside = compose(of_even[k // 2], relative(at[2 * (k // 2)], at[k]))
-            found.append(Place(local.query(), at[k], beside))
-    return whole, half, found
+            found.append(Place(local.query(), scan.pose))
+    return mapped(scans), mapped(scans[::2]), found
 
 
-def looked_for(place: Query, truth, plan: LineMap) -> tuple[float, ...]:
+def looked_for(place: Place, on: Mapped) -> tuple[float, ...]:
     """Return the verdict, whether the best pose is right, and the shares of the beams there."""
-    where = locate(place, plan)
-    x, y, turn = (9.0, 9.0, 9.0) if truth is None else relative(truth, where.pose)
+    where = locate(place.query, on.plan)
+    x, y, turn = relative(on.expected(place, where.pose), where.pose)
     of = where.evidence
     right = math.hypot(x, y) < RIGHT[0] and abs(turn) < RIGHT[1]
     return VERDICTS.index(where.verdict), right, of.explained, of.short, of.contradicted
 
 
-def judged(places, truths, plan) -> np.ndarray:
-    return np.array([looked_for(p.query, t, plan) for p, t in zip(places, truths, strict=True)])
+def judged(places: list[Place], on: Mapped, *, is_there: bool = True) -> np.ndarray:
+    rows = np.array([looked_for(place, on) for place in places])
+    rows[:, 1] *= is_there
+    return rows
 
 
-def report(logs: dict[str, tuple[LineMap, LineMap, list[Place]]]) -> None:
+def report(logs: dict[str, tuple[Mapped, Mapped, list[Place]]]) -> None:
     print("| log | map | places | best pose right | located, right | ambiguous | false |")
     print("|---|---|--:|--:|--:|--:|--:|", flush=True)
     names = list(logs)
     for k, (name, (whole, half, found)) in enumerate(logs.items()):
-        maps = [
-            ("the whole log", whole, [p.whole for p in found]),
-            ("its even scans", half, [p.half for p in found]),
-        ]
+        maps = [("the whole log", whole, True), ("its even scans", half, True)]
         if len(names) > 1:
             other = names[(k + 1) % len(names)]
-            maps.append((f"of {other}", logs[other][0], [None] * len(found)))
-        for about, plan, truths in maps:
-            rows = judged(found, truths, plan)
+            maps.append((f"of {other}", logs[other][0], False))
+        for about, on, is_there in maps:
+            rows = judged(found, on, is_there=is_there)
             located, right = rows[:, 0] == 0, rows[:, 1] > 0
             shares = (right, located & right, rows[:, 0] == 1)
             cells = " | ".join(f"{100 * of.mean():.1f} %" for of in shares)
@@ -115,20 +132,41 @@ def report(logs: dict[str, tuple[LineMap, LineMap, list[Place]]]) -> None:
                   flush=True)  # fmt: skip
 
 
-def fit(logs: dict[str, tuple[LineMap, LineMap, list[Place]]]) -> None:
-    """Print shares of the beams at right poses, and at the best ones on plans of other places."""
-    right, wrong = [], []
+def fit(logs: dict[str, tuple[Mapped, Mapped, list[Place]]]) -> None:
+    """Print shares of the beams at right poses, and at the best ones on plans of other places.
+
+    And those where the log says that a place is, and at all poses that are tried elsewhere.
+    """
+    right, wrong, there, tried = [], [], [], []
     for k, name in enumerate(FITTED):
         whole, half, found = logs[name]
         found = found[: len(found) // 2]
-        for plan, truths in ((whole, [p.whole for p in found]), (half, [p.half for p in found])):
-            right.append(judged(found, truths, plan))
-        other = logs[FITTED[(k + 1) % len(FITTED)]][0]
-        wrong.append(judged(found, [None] * len(found), other))
+        right += [judged(found, on) for on in (whole, half)]
+        wrong.append(judged(found, logs[FITTED[(k + 1) % len(FITTED)]][0], is_there=False))
+        both = np.array([elsewhere(place, whole) for place in found])
+        there.append(both[:, 0])
+        tried.append(both[:, 1])
     # Each log counts alike.
     at_right = np.mean([rows[rows[:, 1] > 0, 2:].mean(axis=0) for rows in right], axis=0)
     at_wrong = np.mean([rows[:, 2:].mean(axis=0) for rows in wrong], axis=0)
     print(f"right {at_right.round(3)}, best wrong {at_wrong.round(3)}; now {OF_MAPS}")
+    of_log, of_tried = (
+        np.mean([of.mean(axis=0) for of in rows], axis=0) for rows in (there, tried)
+    )
+    now = RIGHT_ON_MAP, WRONG_ON_MAP
+    print(f"of the log {of_log.round(3)}, tried elsewhere {of_tried.round(3)}; now {now}")
+
+
+def elsewhere(place: Place, on: Mapped) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shares of the beams where the log puts a place, and at poses tried elsewhere."""
+    k = nearest(on.logged, place.pose)
+    here = compose(on.poses[k], relative(on.logged[k], place.pose))
+    poses = _tried(place.query.anchors, place.query, on.plan)
+    far = poses[np.hypot(*(poses[:, :2] - here[:2]).T) > ELSEWHERE]
+    return tuple(
+        evidence_of(of, place.query.beams, on.plan.index, TIGHT)[:, 1:].mean(axis=0)
+        for of in (np.array([here]), far)
+    )
 
 
 def main() -> None:

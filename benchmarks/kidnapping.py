@@ -156,7 +156,7 @@ class Robot:
 def real(name: str) -> str:
     """Follow a log on the grid of its map, as it is and carried away; return a row of the table."""
     scans = [scan for scan in open_log(DATA / LOGS[name]) if scan.pose is not None]
-    made, truth = mapped(scans)
+    made, truth, _ = mapped(scans)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "map.yaml"
         made.write(path)

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,7 +121,7 @@ def test_on_a_map_of_scans_more_beams_may_pass_through_walls(monkeypatch):
     drawn, mapped = PLAN, LineMap(PLAN.walls, sigma=MAPPED)
     assert (drawn.is_mapped, mapped.is_mapped) == (False, True)
     query, poses = query_at(POSE, PLAN), np.array([POSE, (1.5, 0.5, 0.7)])
-    shares = 0.75, 0.1, 0.15
+    shares = 0.82, 0.1, 0.08
     for plan, behind, verdict in (
         (drawn, 99.0, LOST),
         (mapped, 99.0, LOCATED),
@@ -142,17 +143,18 @@ def beside_the_mirror_image(monkeypatch, plan, explained, ahead, odds=60.0):
     of_best = np.array([(odds, explained, 1 - explained, 0.0)])
     rows = iter([of_best, np.array([(odds - ahead, 0.9, 0.1, 0.0)])])
     monkeypatch.setattr(MODULE, "_searched", lambda *_: (np.array([POSE]), next(rows)))
-    return _anywhere(query_at(POSE, PLAN), plan).verdict
+    query = query_at(POSE, PLAN)
+    return _anywhere(replace(query, beams=np.repeat(query.beams, 2, axis=0)), plan).verdict
 
 
 @pytest.mark.parametrize(("is_mapped", "both"), [(False, 18.0), (True, 30.0)])
 def test_what_hardly_passes_one_limit_has_to_pass_the_other_by_more(monkeypatch, is_mapped, both):
     """The odds over chance and the lead over the mirror image together exceed a limit."""
     plan = LineMap(PLAN.walls, sigma=MAPPED) if is_mapped else PLAN
-    n = len(query_at(POSE, PLAN).beams) / 3
+    n = 2 * len(query_at(POSE, PLAN).beams) / 3
     chance = math.log(7.0 * 5.0 / BOX**2 * 2 * math.pi / TURN)
-    for share in (0.68, 0.72):
-        over = share * math.log(0.73 / 0.33) + (1 - share) * math.log(0.15 / 0.34)
+    for share in (0.60, 0.66):
+        over = share * math.log(0.80 / 0.39) + (1 - share) * math.log(0.17 / 0.33)
         odds = chance + 8.0
         ahead = both - (over * n if is_mapped else 8.0)
         assert ahead > (LEAD if is_mapped else 3.0)

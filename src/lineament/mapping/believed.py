@@ -10,7 +10,7 @@ from ..scan import Array
 from ..scan.poses import compose, inverse, relative
 from ..walls import Records
 from .drive_map import KeyFrame
-from .evidence import RIGHT_ON_MAP, WRONG_ON_MAP, evidence_of
+from .evidence import RIGHT_ON_MAP, WRONG_ON_MAP, Says, evidence_of
 from .index import MAPPED
 from .line_map import LineMap
 from .local_map import Query
@@ -76,5 +76,5 @@ def _judged(query: Query, own: Records, others: Records, poses: Array, before: A
     index = LineMap(own, sigma=MAPPED).index
     passes = [evidence_of(poses[:1], beam[None], index, _TIGHT)[0, 3] for beam in query.beams]
     beams = np.ascontiguousarray(query.beams[np.array(passes) == 0])
-    says, index = (_ENDS + 0.5, 0.0, _PASSES), LineMap(others, sigma=MAPPED).index
+    says, index = Says(_ENDS + 0.5, 0.0, _PASSES, opens=True), LineMap(others, sigma=MAPPED).index
     return np.asarray(evidence_of(poses[1:], beams, index, _TIGHT, says, before=before)[:, 0])

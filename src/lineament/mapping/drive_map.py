@@ -16,7 +16,7 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from ..walls import Numbers, as_walls, segments_of, wrapped
 from ..walls.sights import WHOLE, lines_of, sights_of, walls_along
-from .evidence import evidence_of
+from .evidence import Says, evidence_of
 from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off
@@ -29,7 +29,7 @@ _BINS, _TURNS = 120, 12
 #: What a beam that passes through a wall says [nats], and what it takes off those explained; with
 #: it, what one says that is explained, and one that is short.
 _MILD, _PASSED = -0.8, 0.5
-_SAYS = math.log(7 / 3) + 0.5, math.log(0.7), _MILD
+_SAYS = Says(math.log(7 / 3) + 0.5, math.log(0.7), _MILD)
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
 #: Key frames through which a wall is remembered that is not seen.

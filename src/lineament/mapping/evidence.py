@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +17,8 @@ RIGHT, WRONG = (0.70, 0.28, 0.02), (0.30, 0.40, 0.30)
 #: The same shares on maps that scans made: what stood there once is passed through, walls bow. Then
 #: those at the best of all poses on the map of another building. ``benchmarks/evidence.py --fit``
 #: counts both, on the first halves of three real logs.
-RIGHT_ON_MAP, WRONG_ON_MAP = (0.76, 0.13, 0.11), (0.10, 0.42, 0.48)
-OF_MAPS = (0.73, 0.15, 0.12), (0.33, 0.34, 0.33)
+RIGHT_ON_MAP, WRONG_ON_MAP = (0.84, 0.13, 0.03), (0.19, 0.43, 0.38)
+OF_MAPS = (0.80, 0.17, 0.03), (0.39, 0.33, 0.28)
 #: At a wrong pose, so many of the beams end near a wall, for each metre across it [1/m].
 DENSITY = 0.3
 #: Beams near each other fall on the same things: one in so many counts.
@@ -29,9 +30,21 @@ _EXPLAINED, _SHORT, _THROUGH = (
     math.log(right / wrong) for right, wrong in zip(RIGHT, WRONG, strict=True)
 )
 
-#: What each beam says: one that ends at a wall, one before it, and one that passed through it.
-Says = tuple[float, float, float]
-ON_DRAWING: Says = (_EXPLAINED + 0.5, _SHORT, _THROUGH)
+
+class Says(NamedTuple):
+    """What each beam says [nats]: one that ends at a wall, before one, and that passed through one.
+
+    `opens` is whether walls may be seen through, and stand where a door was: a beam that ends on a
+    wall is then explained, whatever it has passed.
+    """
+
+    at_wall: float
+    short: float
+    through: float
+    opens: bool = False
+
+
+ON_DRAWING = Says(_EXPLAINED + 0.5, _SHORT, _THROUGH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +94,9 @@ def evidence_of(
     if not len(beams):
         return found
     found[:, 0] *= TOGETHER
-    of_beams = (*says, spread**2, MARGIN + spread, SHY + spread)
+    of_beams = (*says[:3], spread**2, MARGIN + spread, SHY + spread)
     settings = (*of_beams, best * TOGETHER, apart * TOGETHER)
-    judge(np.ascontiguousarray(poses), beams, *index, settings, found)
+    judge(np.ascontiguousarray(poses), beams, *index, settings, says.opens, found)
     found[:, 0] /= TOGETHER
     found[:, 1:] /= max(beams[:, 6].sum(), 1e-12)
     return found
@@ -93,10 +106,10 @@ def on_map(spread: float) -> Says:
     """Return what beams say on a map of scans, where `spread` [m] is added to their errors."""
     at_wall = math.log(RIGHT_ON_MAP[0] / (DENSITY * math.sqrt(2 * math.pi) * spread))
     short, through = (math.log(RIGHT_ON_MAP[k] / WRONG_ON_MAP[k]) for k in (1, 2))
-    return at_wall, short, through
+    return Says(at_wall, short, through, opens=True)
 
 
-def over_chance(shares: Says, beams: int) -> float:
+def over_chance(shares: tuple[float, float, float], beams: int) -> float:
     """Log-odds of shares of beams on a map: of the right pose over the best on another's map."""
     parts = zip(shares, *OF_MAPS, strict=True)
     return beams / TOGETHER * sum(of * math.log(right / chance) for of, right, chance in parts)

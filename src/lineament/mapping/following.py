@@ -17,7 +17,7 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
 from .consistency import is_consistent
-from .evidence import Evidence, evidence_of
+from .evidence import ON_DRAWING, Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import FASTEST, LocalMap, beams_of, thinned
 from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
@@ -34,9 +34,8 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: otherwise takes back a part of one.
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says, nor is one
-#: that is so likely over chance, or less [nats]: on a drawing; on a map, through whose walls more
-#: beams pass where the pose is right, and in whose clutter chance does as well.
-DENIED, DENIED_ON_MAP = (0.12, 0.0), (0.3, -8.0)
+#: that is no likelier there than by chance [nats].
+DENIED = 0.12, 0.0
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -122,7 +121,7 @@ class Follower(InTurn):
 
     def __init__(self, plan: LineMap, way: float = 5.0) -> None:
         self.plan, self.way = plan, way
-        self._most, self._least = DENIED_ON_MAP if plan.is_mapped else DENIED
+        self._most, self._least = DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
         self._scan: LaserScan | None = None
@@ -246,7 +245,8 @@ class Follower(InTurn):
         """Return what the beams of a scan alone say of the pose."""
         beams = thinned(beams_of(features))
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
-        found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
+        says = ON_DRAWING._replace(opens=self.plan.is_mapped)
+        found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread, says)
         odds, explained, short, contradicted = found[0].tolist()
         return Evidence(odds, explained, short, contradicted, len(beams))
 

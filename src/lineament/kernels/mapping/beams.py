@@ -110,6 +110,7 @@ def judge(
     begins: Ints1,
     members: Ints1,
     settings: tuple[float, float, float, float, float, float, float, float],
+    opens: bool,
     found: Floats2,
 ):
     """Sum up the evidence of beams for poses.
@@ -120,7 +121,8 @@ def judge(
 
     `settings`: log-likelihood ratio of a beam explained, short, and passing through; variance that
     is added to all; how far past a wall's end it explains, and how near to it a beam may pass [m];
-    the best one before; `apart`.
+    the best one before; `apart`. `opens` is whether walls may be seen through: a beam that ends on
+    a wall is then explained, whatever it has passed.
     """
     explained, short, through, spread, margin, shy, best, apart = settings
     most, count = max(explained, short, through), len(beams)
@@ -154,15 +156,17 @@ def judge(
             )
             direction, end = (dx, dy, variance), (ex, ey)
             rest -= weight
-            if _passes(walls, grid, begins, members, (ox, oy), end, direction, pose, shy, spread):
-                passes += weight
-                total += weight * through
-                continue
             deviation, at = math.inf, cell_of(grid, ex, ey)
             if at >= 0:
                 near = members[begins[at] : begins[at + 1]]
                 deviation = _misfit(walls, near, ex, ey, direction, pose, margin, spread)
-            if deviation < math.inf:
+            start, is_there = (ox, oy), deviation < math.inf
+            if not (is_there and opens) and _passes(
+                walls, grid, begins, members, start, end, direction, pose, shy, spread
+            ):
+                passes += weight
+                total += weight * through
+            elif is_there:
                 hits += weight
                 total += weight * max(explained - 0.5 * deviation, short)
             else:
