@@ -259,15 +259,16 @@ scans = 8
 
     configs: list[LiveConfig] = []
     monkeypatch.setattr("lineament.live.run_live", kept)
-    flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
-    flags += " --dock 2 -1.5 --limit scans=7"
+    flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --noise 0.1"
+    flags += " --dock 2 -1.5 --limit scans=7 --from a.bag --rate 2"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0
     assert capfd.readouterr() == ("3 scans, 2 dropped, 1 lost, 0 malformed messages\n", "begun\n")
     assert run(["live", "--ros", "1", "__name:=front", "-q"]) == 0
     assert capfd.readouterr() == ("", "")
     both = {"topic": "front/scan", "domain": 7, "laser_pose": (0.2, 0, 0.0), "echo": "last"}
     both |= {"method": "iepf", "parameters": {"noise_factor": 3.0, "min_points": 6}, "track": True}
-    both |= {"limits": {"beams": 9, "scans": 7}, "localhost": True, "foxglove": 8765, "rate": 2.0}
+    both |= {"limits": {"beams": 9, "scans": 7}, "localhost": True, "foxglove": 8765}
+    both |= {"log": "a.bag", "rate": 2.0}
     assert configs == [LiveConfig(**both, noise=0.1, dock=(2.0, -1.5)), LiveConfig(ros=1)]
 
 

@@ -13,6 +13,20 @@ from lineament.live import LiveConfig, read_config
 _NAME, _TWO = "expected a name of letters, digits, _ and /", {"merge": ("/a",)}
 
 
+#: What would change nothing unless something else is given, too.
+NEEDED = {
+    "a log": {"log_topic": "/b", "poses": "/odom", "ring": 0, "keep_going": True, "rate": 2.0,
+              "loop": True},
+    "several topics": {"mountings": {"/a": (0, 0, 0)}, "unsure": (0.1, 0.1), "tolerance": 0.3},
+    "a map": {"layers": "A", "units": "mm", "judge": "amcl_pose"},
+    "a map or mapping": {"odometry": "odom", "map_frame": "m", "odom_frame": "o",
+                         "transform_tolerance": 0.5, "broadcast": False},
+    "a map, mapping or several topics": {"base_frame": "base_footprint"},
+    "a dock": {"dock_shape": "a.dxf"},
+    "foxglove": {"host": "0.0.0.0"},
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("topic", "namespace", "name"),
     [
@@ -49,12 +63,10 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"namespace": "r\n"}, f"namespace is 'r\\n', {_NAME}"),
         ({"deskew": "up!"}, f"deskew is 'up!', {_NAME}"),
         ({"deskew": "poses"}, "deskew is 'poses', which only a log has; expected a topic, or"),
-        ({"dock_shape": "a.dxf"}, "dock_shape is 'a.dxf', expected a dock as well"),
         ({"odometry": "odom", "log": "a.bag"}, "odometry is 'odom', but a log is played; expected"),
         ({"odometry": "odom", "deskew": "o"}, "deskew is 'o', and odometry 'odom', expected one"),
         ({"odom_frame": "/map"}, "two of map_frame, odom_frame and base_frame are one, expected"),
         ({"map_frame": "a b"}, f"map_frame is 'a b', {_NAME}"),
-        ({"judge": "amcl_pose"}, "judge is 'amcl_pose', expected a map as well"),
         ({"judge": "a", "map": "b", "log": "c", "poses": "/d"}, "poses are not used with judge"),
         ({"judge": "a", "map": "b", "log": "c", "deskew": "poses"}, "poses are not used with jud"),
         ({"deskew": "odom", "log": "a.bag"}, "deskew is 'odom', but a log is played; expected"),
@@ -83,9 +95,9 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"merge": ("a b",)}, f"merge is ('a b',), {_NAME}"),
         ({"merge": "rear"}, "merge is 'rear', expected names"),
         ({"merge": (7,)}, f"merge is (7,), {_NAME}"),
-        ({"mountings": {"/a": (0, 0, 0)}}, "mountings are given, expected several topics"),
         ({**_TWO, "mountings": {"/b": (0, 0, 0)}}, "the mounting is of /b, expected one of"),
         ({**_TWO, "mountings": {"/a": (0, 0)}}, "mounting of /a: pose is (0, 0), expected"),
+        ({**_TWO, "mountings": {"/a": (0, 0, 90)}}, "mounting of /a has theta = 90 rad, more than"),
         ({**_TWO, "unsure": (-1, 0)}, "unsure is (-1, 0), expected two numbers"),
         ({**_TWO, "unsure": (1,)}, "unsure is (1,), expected two finite numbers"),
         ({**_TWO, "tolerance": -1}, "tolerance is -1, expected 0 to 10"),
@@ -95,6 +107,11 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({**_TWO, "log": "a.bag", "log_topic": "/b"}, "log_topic is of one scanner"),
         ({"map": "a.dxf", "mapping": "b.dxf"}, "map and mapping are given"),
         ({"judge": "/amcl_pose", "mapping": "b.dxf"}, "judge and mapping are given"),
+        *(
+            ({name: value}, f"{name} is {value!r}, expected {needed} as well")
+            for needed, given in NEEDED.items()
+            for name, value in given.items()
+        ),
         ({"mapping": "b.png"}, "mapping is 'b.png', expected an ending of .dxf"),
     ],
 )
@@ -175,12 +192,13 @@ def test_what_holds_where_nothing_is_said():
 
 @pytest.mark.parametrize("name", BOUNDS)
 def test_numbers_are_taken_up_to_their_bounds(name):
+    given = {"map": "a.dxf", "log": "a.npz", "merge": ("/b",)}
     for bound, beyond in zip(BOUNDS[name], (-math.inf, math.inf), strict=True):
         is_whole = isinstance(bound, int) and name not in FRACTIONS
         off = bound + int(math.copysign(1, beyond)) if is_whole else math.nextafter(bound, beyond)
-        assert getattr(LiveConfig(log="a.npz", **{name: bound}), name) == bound
+        assert getattr(LiveConfig(**given, **{name: bound}), name) == bound
         with pytest.raises(ValueError, match=f"{name} is "):
-            LiveConfig(log="a.npz", **{name: off})
+            LiveConfig(**given, **{name: off})
 
 
 @pytest.mark.parametrize("name", TIMES_AND_SIZES)

@@ -37,7 +37,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 
 
 @click.command()
-@click.option("--config", type=PATH, help="TOML file of the options below; flags go before it.")
+@click.option("--config", type=PATH, help="TOML file of the options below; flags override it.")
 @click.option(
     "--topic",
     "topics",
@@ -46,7 +46,9 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     "  [default: scan]",
 )
 @mountings
-@click.option("--tolerance", type=float, help="Longest time between such scans.  [default: 0.15]")
+@click.option(
+    "--tolerance", type=float, help="Longest time between such scans [s].  [default: 0.15]"
+)
 @click.option("--namespace", help="Put before topics that do not begin with /.")
 @click.option("--name", help="Name of the node.  [default: lineament]")
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
@@ -59,18 +61,23 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option(
     "--reliability", type=_RELIABILITIES, help="Of the subscription.  [default: best-effort]"
 )
-@click.option("--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.")
+@click.option(
+    "--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.  [default: 10]"
+)
 @of_method
 @click.option(
     "--deskew",
     metavar="off|scans|poses|TOPIC",
-    help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
+    help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry."
+    "  [default: off]",
 )
 @LASER_POSE
 @click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
 @MASK
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
-@click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
+@click.option(
+    "--dock", type=float, nargs=2, help="x y of a corner, in the first scan [m]: publish its pose."
+)
 @click.option(
     "--dock-shape", type=TEXT_PATH, metavar="DXF", help="A shape in place of a corner, near --dock."
 )
@@ -83,7 +90,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Make a map, and write it at the end: .dxf, .svg, .parquet or .yaml.",
 )
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
-@click.option("--units", type=UNIT, help="Units of the plan.  [default: those that it names]")
+@click.option("--units", type=UNIT, help="Units of a DXF.  [default: those that it names, or m]")
 @click.option(
     "--odometry", metavar="TOPIC", help="Odometry of the robot on the plan.  [default: /tf]"
 )
@@ -105,7 +112,9 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud in the log.")
 @click.option("--keep-going", **_FLAG, help="Skip what is faulty in the log.")
 @LIMITS
-@click.option("--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.")
+@click.option(
+    "--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.  [default: 1]"
+)
 @click.option("--loop", **_FLAG, help="Start the log again at its end.")
 @click.option(
     "--foxglove",

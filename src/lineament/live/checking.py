@@ -2,7 +2,8 @@
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields
 from typing import Any
 
 from ..drawings import NAMES
@@ -30,6 +31,23 @@ _BOUNDS: dict[str, tuple[float, float]] = {
 }
 FRAMES = ("map_frame", "odom_frame", "base_frame")
 _NAMES = ("topic", "merge", "namespace", "name", "deskew", "odometry", "judge", *FRAMES)
+#: What has to be given, too: whether a configuration has it, and what changes nothing without it.
+#: What describes the scanner may stay while deskewing, say, is switched on and off.
+_NEEDED: dict[str, tuple[Callable[[Any], bool], tuple[str, ...]]] = {
+    "a log": (
+        lambda it: it.log is not None,
+        ("log_topic", "poses", "ring", "keep_going", "rate", "loop"),
+    ),
+    "several topics": (lambda it: bool(it.merge), ("mountings", "unsure", "tolerance")),
+    "a map": (lambda it: it.map is not None, ("layers", "units", "judge")),
+    "a map or mapping": (
+        lambda it: it.has_map,
+        ("odometry", "map_frame", "odom_frame", "transform_tolerance", "broadcast"),
+    ),
+    "a map, mapping or several topics": (lambda it: it.has_map or it.merge, ("base_frame",)),
+    "a dock": (lambda it: it.dock is not None, ("dock_shape",)),
+    "foxglove": (lambda it: it.foxglove is not None, ("host",)),
+}
 #: What each annotation accepts, and how it is called in a message.
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "str": (str, "a text"),
@@ -70,6 +88,15 @@ def check(name: str, annotation: str, value: Any) -> None:
         texts = [value.strip("/") or "none"]
     if name in _NAMES and not all(_is_name(text) for text in texts):
         raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
+
+
+def check_needed(config: Any) -> None:
+    """Refuse what would change nothing, as something that it needs is not given."""
+    defaults = {one.name: {} if one.default is MISSING else one.default for one in fields(config)}
+    for what, (is_given, names) in _NEEDED.items():
+        for name in () if is_given(config) else names:
+            if (value := getattr(config, name)) != defaults[name]:
+                raise ValueError(f"{name} is {value!r}, expected {what} as well")
 
 
 def _is_finite(value: Any) -> bool:

@@ -12,7 +12,7 @@ from ..motion.rig import UNSURE, Rig
 from ..scan import Pose
 from ..scan.changes import Mask, checked_mask
 from ..scan.fields import checked_mounting
-from .checking import FRAMES, Names, Point, check
+from .checking import FRAMES, Names, Point, check, check_needed
 
 #: Formats that a map is written in.
 MAPS = (".dxf", ".svg", ".parquet", ".yaml")
@@ -201,13 +201,12 @@ class LiveConfig:
         self._check_together()
         self._check_mapping()
         self._check_merged()
+        check_needed(self)
 
     def _check_together(self) -> None:
         """Check what has to fit together."""
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
-        if self.dock_shape is not None and self.dock is None:
-            raise ValueError(f"dock_shape is {self.dock_shape!r}, expected a dock as well")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
         if self.log is not None and self.odometry_topic is not None and not self.is_localiser:
@@ -219,8 +218,6 @@ class LiveConfig:
             raise ValueError(
                 f"deskew is {self.deskew!r}, and odometry {self.odometry!r}, expected one topic"
             )
-        if self.judge is not None and self.map is None and self.mapping is None:
-            raise ValueError(f"judge is {self.judge!r}, expected a map as well")
         if self.judge is not None and (self.poses is not None or self.deskew == "poses"):
             raise ValueError("poses are not used with judge; expected odometry, or none for /tf")
         if len({getattr(self, name).strip("/") for name in FRAMES}) < len(FRAMES):
@@ -249,10 +246,10 @@ class LiveConfig:
     def _check_merged(self) -> None:
         """Check what several scanners leave no room for."""
         if not self.merge:
-            if self.mountings:
-                raise ValueError("mountings are given, expected several topics as well")
             return
         _ = self.rig  # Its own errors say what is wrong with it.
+        for topic, pose in self.mountings.items():
+            checked_mounting(pose, f"mounting of {topic}")
         for name in ("laser_pose", "upside_down", "log_topic"):
             if getattr(self, name) not in ((0, 0, 0), False, None):
                 raise ValueError(f"{name} is of one scanner, expected none with several topics")

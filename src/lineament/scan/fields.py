@@ -232,14 +232,14 @@ def checked_pose(pose: Any) -> Pose:
         raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
 
 
-def checked_mounting(laser_pose: Any) -> Pose:
+def checked_mounting(laser_pose: Any, name: str = "laser_pose") -> Pose:
     """Pose of the scanner on what poses are of: three finite numbers, the last an angle."""
     try:
         pose = checked_pose(laser_pose)
     except ValueError as error:
-        raise ValueError(f"laser_{error}") from None
+        raise ValueError(f"{name}{str(error).removeprefix('pose')}") from None
     if abs(pose[2]) > 2 * math.pi:
-        raise ValueError(f"laser_pose has theta = {pose[2]:g} rad, more than a turn{DEGREES}")
+        raise ValueError(f"{name} has theta = {pose[2]:g} rad, more than a turn{DEGREES}")
     return pose
 
 
