@@ -423,6 +423,11 @@ def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
         ("plan a.svg -o b.dxf --dark", "--dark: expected a picture, .png or .pdf, not .dxf"),
         ("plan a.svg -o b.dxf --resolution 1", "--resolution: expected a grid, .yaml, not .dxf"),
         ("plan a.yaml -o b.yaml --resolution 1", "a.yaml is a grid, whose cells are kept"),
+        ("plan wall.svg -o b.yaml --resolution nan", "resolution is nan m a cell, expected 0.0001"),
+        ("plan wall.svg -o b.yaml --resolution 50", "resolution is 50 m a cell, expected 0.0001"),
+        ("info wall.svg --scale 0.001", "--scale: is of a log, but wall.svg is a plan"),
+        ("view a.bag --layers A", "--layers: is of the plan of --map, which is not given"),
+        ("simulate room -o a.npz --speed 2", "--speed: the scanner stands in world 'room'"),
         ("map a.bag -o b.svg --odometry /o --no-odometry", "expected none beside --no-odometry"),
         (
             "locate a.bag --map a.svg -o b.csv --odometry /o --no-odometry",

@@ -302,6 +302,10 @@ def replaced(old, new):
     ("about", "line"),
     [
         (replaced("resolution: 0.1", "resolution: 0"), r"a\.yaml: .*resolution is 0 m a cell"),
+        (
+            replaced("0, 0, 0", "0, 0, 90"),
+            r"a\.yaml: .*origin has theta = 90 rad, more than a turn",
+        ),
         (replaced("resolution: 0.1", "resolution: nan"), "resolution is 'nan', expected a number"),
         (replaced("resolution: 0.1\n", ""), r"a\.yaml: is no grid of map_server: resolution is mi"),
         (replaced("[0, 0, 0]", "[0, 0]"), "origin has 2 numbers, expected 3: x, y, yaw"),
@@ -403,8 +407,12 @@ def test_what_beams_pass_through_is_free():
     assert grid.cells[row, column + 20] == 100
     assert (grid.cells[row + 1 : row + 5, column] == 0).all()
     assert (grid.cells[:, :column] == -1).all()
-    with pytest.raises(ValueError, match="resolution is 0, expected a length > 0"):
-        Grid.drawn(line, resolution=0)
+    for resolution in (0, 50, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"resolution is {resolution} m a cell, expected 0.00"):
+            Grid.drawn(line, resolution=resolution)
+    for name in ("m", "m.pgm", "m.png"):
+        with pytest.raises(ValueError, match=f"{name}: is the name of no grid, expected an end"):
+            grid.write(name)
     with pytest.raises(ln.LineamentError, match="cells, more than the limit of 90"):
         Grid.drawn(line, limits=Limits(cells=90))
 

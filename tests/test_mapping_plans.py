@@ -294,7 +294,10 @@ LINES, SEEN, EMPTY, EYE = LineMap.from_lines, LineMap.from_features, features(),
             [np.zeros((3, 3)), 0.05],
             r"^cells are float64 of shape \(3, 3\), expected int8 in rows and columns$",
         ),
-        (Grid, [np.zeros((3, 3), np.int8), 0], "^resolution is 0, expected a length > 0$"),
+        (Grid, [np.zeros((3, 3), np.int8), 0], "^resolution is 0 m a cell, expected 0.0001 to 10$"),
+        (Grid, [np.zeros((3, 3), np.int8), 1, (0, 1)], r"^origin is \(0, 1"),
+        (Grid, [np.zeros((3, 3), np.int8), 1, (0, math.nan, 1)], r"^origin is \(0, nan, 1\), expe"),
+        (Grid, [np.zeros((3, 3), np.int8), 1, (0, 0, 90)], "^origin has theta = 90 rad, more than"),
     ],
 )
 def test_what_would_be_half_taken_is_refused(call, given, problem):

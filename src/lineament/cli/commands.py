@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from .options import (
     HUSH,
@@ -32,6 +33,11 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
     from ..tasks.plan import PLANS, describe_plan
 
     if Path(log).suffix.lower() in PLANS:
+        context = click.get_current_context()
+        for option in context.command.params:
+            is_given = context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+            if is_given and option.name not in ("log", "limits", "quiet"):
+                raise click.UsageError(f"{option.opts[0]}: is of a log, but {log} is a plan")
         click.echo(describe_plan(log, reading["limits"]))
         return
     from ..logs import open_log, summarize
@@ -129,6 +135,9 @@ def view(
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
+    for name, value in drawing.items():
+        if plan is None and value is not None:
+            raise click.UsageError(f"--{name}: is of the plan of --map, which is not given")
     drawn = None
     if plan is not None:
         from ..mapping import LineMap

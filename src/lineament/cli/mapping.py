@@ -16,6 +16,7 @@ from .options import (
     complain,
     extracting,
     of_plan,
+    wrong_usage,
 )
 from .options import reading_odometry as reading
 
@@ -158,7 +159,7 @@ def locate(
 @of_plan
 @click.option(
     "--resolution",
-    type=click.FloatRange(min=0, min_open=True),
+    type=float,
     help="Size of the cells of a grid that is drawn [m].  [default: 0.05]",
 )
 @click.option("--dark", is_flag=True, help="Draw on black.")
@@ -172,6 +173,7 @@ def plan(
     PLAN is a .dxf, .yaml (an occupancy grid of nav2), .parquet or .svg of lineament; OUTPUT one of
     them, .csv, .jsonl, .geojson (in metres), .png or .pdf.
     """
+    from ..mapping.grid_files import check_resolution
     from ..mapping.grids import GRID_ENDINGS
     from ..tasks.plan import ENDINGS, PICTURES, convert_plan
 
@@ -184,6 +186,8 @@ def plan(
             raise click.UsageError(f"--resolution: expected a grid, .yaml, not {ending}")
         if before in GRID_ENDINGS:
             raise click.UsageError(f"--resolution: {plan} is a grid, whose cells are kept")
+        with wrong_usage():
+            check_resolution(resolution)
         given["resolution"] = resolution
     done = convert_plan(plan, output, dark=dark, **given)
     if not quiet:

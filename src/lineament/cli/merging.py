@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     "--tolerance",
     type=click.FloatRange(min=0),
     metavar="SECONDS",
-    help="Longest time between scans that are merged.  [default: half a period of the slowest]",
+    help="Longest time between scans that are merged.  [default: 0.55 periods of the slowest]",
 )
 @extracting
 @reading

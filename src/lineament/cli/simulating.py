@@ -30,14 +30,28 @@ def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, qu
 @click.argument("world", default="building")
 @click.option("-o", "--output", required=True, type=PATH, help="Log to write: .npz, .log, .log.gz.")
 @click.option("--sensor", "name", default="utm30lx", show_default=True, help="Preset of a scanner.")
-@click.option("--scans", type=click.IntRange(min=1), help="[default: the whole drive, or 100]")
+@click.option(
+    "--scans", type=click.IntRange(min=1), help="[default: the whole drive, at most; or 100]"
+)
 @SEED
-@click.option("--speed", type=float, default=0.6, show_default=True, help="Of the drive [m/s].")
+@click.option("--speed", type=float, help="Of the drive [m/s].  [default: 0.6]")
 @click.option("--rate", type=float, help="Scans a second.  [default: the sensor's]")
 @click.option("--moving", is_flag=True, help="Move while the scanner sweeps.")
-@click.option("--noise", "sigma", type=float, metavar="SIGMA", help="Noise of the ranges [m].")
-@click.option("--dropout", type=float, help="Probability that a beam returns nothing.")
-@click.option("--outlier", type=float, help="Probability of a false return.")
+@click.option(
+    "--noise",
+    "sigma",
+    type=float,
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: the sensor's]",
+)
+@click.option(
+    "--dropout",
+    type=float,
+    help="Probability that a beam returns nothing.  [default: the sensor's]",
+)
+@click.option(
+    "--outlier", type=float, help="Probability of a false return.  [default: the sensor's]"
+)
 @QUIET
 def simulate(
     world: str,
@@ -46,6 +60,7 @@ def simulate(
     sigma: float | None,
     dropout: float | None,
     outlier: float | None,
+    speed: float | None,
     quiet: bool,
     **settings: Any,
 ) -> None:
@@ -54,9 +69,13 @@ def simulate(
     WORLD is "building" (the default), driven through from end to end; or a kind of random scene,
     seen from one place: room, star, corridor, hall, grazing, layers.
     """
-    from ..simulation import sensor_like, simulate_log
+    from ..simulation import SCENES, sensor_like, simulate_log
     from .progress import tracker
 
+    if speed is not None:
+        if world in SCENES:
+            raise click.UsageError(f"--speed: the scanner stands in world {world!r}")
+        settings["speed"] = speed
     with wrong_usage():
         sensor = sensor_like(name, sigma=sigma, dropout=dropout, outlier=outlier)
         simulate_log(output, world, sensor, track=tracker(quiet), **settings)

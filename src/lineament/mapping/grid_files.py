@@ -14,6 +14,7 @@ from ..drawings import check_file, plan_error
 from ..errors import LineamentError
 from ..limits import Limits
 from ..scan import Pose
+from ..scan.fields import checked_mounting
 
 #: Values of cells, as in ROS.
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -116,8 +117,7 @@ def _checked(fields: dict[str, str]) -> About:
     resolution, occupied, free = (
         _number(name, fields[name]) for name in ("resolution", "occupied_thresh", "free_thresh")
     )
-    if not 1e-4 <= resolution <= 10:
-        raise ValueError(f"resolution is {resolution:g} m a cell, expected 0.0001 to 10")
+    check_resolution(resolution)
     if not 0 <= free < occupied <= 1:
         raise ValueError(
             f"free_thresh is {free:g} and occupied_thresh {occupied:g}, "
@@ -128,8 +128,14 @@ def _checked(fields: dict[str, str]) -> About:
         raise ValueError(f"mode is {mode!r}, expected one of {', '.join(_MODES)}")
     if negate not in _TRUE + _FALSE:
         raise ValueError(f"negate is {negate!r}, expected 0 or 1")
-    x, y, yaw = origin
+    x, y, yaw = checked_mounting(origin, "origin")
     return About(fields["image"], resolution, (x, y, yaw), occupied, free, mode, negate in _TRUE)
+
+
+def check_resolution(resolution: float) -> None:
+    """Refuse cells that are as large as no map's, or no number [m]."""
+    if not 1e-4 <= resolution <= 10:
+        raise ValueError(f"resolution is {resolution:g} m a cell, expected 0.0001 to 10")
 
 
 def _number(name: str, text: str) -> float:

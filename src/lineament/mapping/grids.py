@@ -14,7 +14,18 @@ from ..errors import LineamentError
 from ..files import naming_errors, written_beside
 from ..limits import Limits
 from ..scan import Array, LaserScan, Pose
-from .grid_files import FREE, OCCUPIED, RAW, SCALE, UNKNOWN, read_about, read_shades, values_of
+from ..scan.fields import checked_mounting
+from .grid_files import (
+    FREE,
+    OCCUPIED,
+    RAW,
+    SCALE,
+    UNKNOWN,
+    check_resolution,
+    read_about,
+    read_shades,
+    values_of,
+)
 
 #: Endings of the file that names the image of a grid.
 GRID_ENDINGS = (".yaml", ".yml")
@@ -59,8 +70,8 @@ class Grid:
         if cells.dtype != np.int8 or cells.ndim != 2:
             had = f"{cells.dtype} of shape {cells.shape}"
             raise ValueError(f"cells are {had}, expected int8 in rows and columns")
-        if not 0 < self.resolution < math.inf:
-            raise ValueError(f"resolution is {self.resolution}, expected a length > 0")
+        check_resolution(self.resolution)
+        checked_mounting(self.origin, "origin")
 
     @property
     def occupied(self) -> NDArray[np.bool_]:
@@ -107,9 +118,13 @@ class Grid:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the YAML, and a PGM of the same name beside it: both, or none.
 
-        Cells that are more or less occupied are written as `mode: raw`, which keeps them.
+        Cells that are more or less occupied are written as `mode: raw`, which keeps them. A
+        ValueError for another ending than ``.yaml`` and ``.yml``: the PGM may not have its name.
         """
         yaml, image = files_of(path)
+        if yaml.suffix.lower() not in GRID_ENDINGS:
+            wanted = " or ".join(GRID_ENDINGS)
+            raise ValueError(f"{yaml}: is the name of no grid, expected an ending of {wanted}")
         plain = (self.least, self.most) == (OCCUPIED, FREE)
         if plain and np.isin(self.cells, list(_SHADES)).all():
             mode, occupied, free, pixels = "trinary", _OCCUPIED, _FREE, self.cells.astype(np.uint8)
@@ -145,8 +160,7 @@ class Grid:
         Cells that beams of scans passed through, each from its pose, are free: all but the last on
         the way to where a beam ends. The others are unknown.
         """
-        if not 0 < resolution < math.inf:
-            raise ValueError(f"resolution is {resolution}, expected a length > 0")
+        check_resolution(resolution)
         seen = list(seen)
         shown = [lines.reshape(-1, 2), *(_ends(*one) for one in seen)]
         low = np.floor(np.min([part.min(axis=0) for part in shown], axis=0) / resolution) - _MARGIN
