@@ -181,7 +181,12 @@ def test_a_plan_is_drawn_larger_by_the_round_factor_that_just_fills_it():
 
 @pytest.mark.parametrize(
     ("stamp", "time"),
-    [(0.0, ""), (12.345, " · 12.35 s"), (1_500_000_000.0, " · 2017-07-14 02:40:00 UTC")],
+    [
+        (0.0, ""),
+        (12.345, " · 12.35 s"),
+        (1_500_000_000.0, " · 2017-07-14 02:40:00 UTC"),
+        (1e12, " · 1000000000000.00 s"),
+    ],
 )
 def test_titles_have_log_scan_and_time(stamp, time, drawn):
     scan = ln.LaserScan([1.0], 0.0, 0.1, stamp=stamp)

@@ -282,6 +282,19 @@ def test_recording_is_whole_and_has_everything(tmp_path):
     assert_approved("recording", sorted(lines))
 
 
+@pytest.mark.parametrize("stamp", [1e12, -1e12])
+def test_stamps_that_rerun_does_not_hold(tmp_path, stamp):
+    pytest.importorskip("rerun")
+    scan = LaserScan([2.0] * 6, 0.0, 0.1, stamp=stamp)
+    problem = r"a\.rrd: scan 0 has the stamp .*e\+12 s, which rerun does not hold$"
+    with (
+        pytest.raises(LineamentError, match=problem),
+        open_writer(tmp_path / "a.rrd") as writer,
+    ):
+        writer.write(FOUND, scan)
+    assert not [*tmp_path.iterdir()]
+
+
 def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     path, scan = tmp_path / "a.rrd", LaserScan([2.0] * 6, 0.0, 0.1)

@@ -34,14 +34,14 @@ _WAYS: dict[str, tuple[str, float, str]] = {
     "direction unobserved": ("arc", 3.0, "-"),
     "not located": ("corner", 1.8, ":"),
 }
-#: A stamp is a date if it is later than 1990 [s].
-_DATES = 631_152_000
+#: A stamp is a date from 1990 to 2100 [s].
+_LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 
 
 def scan_title(log: str | os.PathLike[str], index: int, scan: LaserScan, topic: str = "") -> str:
     """Return a title of a picture: log, scan, its topic if given, and the time of the scan."""
     parts = [Path(str(log).rstrip("/")).name, f"scan {index}", *([topic] if topic else [])]
-    if scan.stamp > _DATES:
+    if _LONG_AGO <= scan.stamp < _FAR_OFF:
         parts.append(f"{datetime.fromtimestamp(scan.stamp, UTC):%Y-%m-%d %H:%M:%S} UTC")
     elif scan.stamp:
         parts.append(f"{scan.stamp:.2f} s")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import LineamentError
 from .markers import markers_of
 from .scene import layers_of
 from .writer import Found, Writer
@@ -78,7 +79,11 @@ class RerunWriter(Writer):
         assert scan is not None  # `needs_scan`
         recording, place = self._recording, f"world/{(topic or 'scan').strip('/')}"
         recording.set_time(SCAN, sequence=index)
-        recording.set_time(STAMP, duration=np.timedelta64(scan.stamp_ns, "ns"))
+        try:
+            recording.set_time(STAMP, duration=np.timedelta64(scan.stamp_ns, "ns"))
+        except OverflowError:
+            problem = f"scan {index} has the stamp {scan.stamp:g} s, which rerun does not hold"
+            raise LineamentError(f"{self.path}: {problem}") from None
         if scan.pose is not None:
             x, y, theta = scan.pose
             turn = rr.RotationAxisAngle(axis=[0.0, 0.0, 1.0], radians=theta)
