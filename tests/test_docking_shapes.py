@@ -147,6 +147,24 @@ def test_what_is_not_there_is_not_found():
     assert find_shape(seen(shape, (2.0, 0.0, 0.0), rng, post), shape, (2.0, 0.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ([(math.nan, 0, 0)], r"guess is \(nan, 0, 0\), expected three finite numbers"),
+        ([(2.0, 0.0)], r"guess is \(2.0, 0.0\), expected three finite numbers"),
+        ([(2.0, 0, 0), (500, 500, 3)], r"reach is \(500, 500, 3\), expected 0 to 10 \[m, m, rad\]"),
+        ([(2.0, 0, 0), (-1, 1, 1)], r"reach is \(-1, 1, 1\), expected 0 to 10"),
+        ([(2.0, 0, 0), (1, 1)], r"reach is \(1, 1\), expected three finite numbers"),
+    ],
+)
+def test_a_place_that_makes_no_sense_is_refused(given, problem):
+    features = seen(Shape(V), (2.0, 0.0, 0.0), np.random.default_rng(0))
+    with pytest.raises(ValueError, match=problem):
+        find_shape(features, Shape(V), *given)
+    with pytest.raises(ValueError, match=r"point is \(nan, 0, 0.0\), expected three finite"):
+        ShapeDock(Shape(V), (math.nan, 0))
+
+
 def test_two_of_a_kind_are_ambiguous():
     shape, rng = Shape(V), np.random.default_rng(1)
     other = shape.placed((2.0, 0.8, 0.0)).reshape(-1, 4)

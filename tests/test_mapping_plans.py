@@ -16,7 +16,7 @@ import lineament as ln
 from lineament.cli import run
 from lineament.drawings import UNITS
 from lineament.logs import save_log
-from lineament.mapping import Grid, LineMap, locate
+from lineament.mapping import Grid, LineMap, LocalMap, locate, merge_features
 from lineament.simulation import SENSORS, drive, office, room
 
 
@@ -282,8 +282,14 @@ LINES, SEEN, EMPTY, EYE = LineMap.from_lines, LineMap.from_features, features(),
             r"^columns are \[\[1, 1, 1\], \[1, 1\]\], expected numbers of shape \(n, 3\)$",
         ),
         (partial(LINES, side=2), [ROOM], "^side is 2, expected 0 or 1$"),
-        (partial(LINES, sigma=-0.1), [ROOM], "^sigma is -0.1, expected a length ≥ 0$"),
-        (partial(LINES, sigma=math.nan), [ROOM], "^sigma is nan, expected a length ≥ 0$"),
+        *(
+            (
+                partial(LINES, sigma=sigma),
+                [ROOM],
+                f"^sigma is {sigma}, expected less than 1 in metr",
+            )
+            for sigma in (-0.1, math.nan, 45)  # in millimetres
+        ),
         (
             partial(LineMap.read, layers="A-WALL*"),
             ["plan.dxf"],
@@ -303,6 +309,38 @@ LINES, SEEN, EMPTY, EYE = LineMap.from_lines, LineMap.from_features, features(),
 def test_what_would_be_half_taken_is_refused(call, given, problem):
     with pytest.raises(ValueError, match=problem):
         call(*given)
+
+
+SEEN = ln.LaserScan([2.0] * 5, -0.02, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "problem"),
+    [
+        ({"query": SEEN}, TypeError, "features is of type LaserScan, expected Features: what ext"),
+        ({"plan": "plan.dxf"}, TypeError, "plan is of type str, expected LineMap: LineMap.read"),
+        (
+            {"guess": (0.0, 1.0)},
+            ValueError,
+            r"guess is \(0.0, 1.0\), expected three finite numbers",
+        ),
+        ({"guess": (math.nan, 1, 0)}, ValueError, r"guess is \(nan, 1, 0\), expected three finite"),
+        ({"guess": 5}, ValueError, r"guess is 5, expected \(x, y, theta\)"),
+    ],
+)
+def test_what_would_be_looked_for_in_vain_is_refused(given, kind, problem):
+    with pytest.raises(kind, match=problem):
+        locate(**{"query": ln.extract(SEEN), "plan": LineMap.from_lines(ROOM)} | given)
+
+
+def test_a_scan_is_no_features():
+    tracks = ln.Tracker()(ln.extract(SEEN))
+    for call in (
+        partial(LocalMap().add, SEEN, tracks),
+        partial(merge_features, [SEEN], [(0, 0, 0)]),
+    ):
+        with pytest.raises(TypeError, match="features is of type LaserScan, expected Features"):
+            call()
 
 
 def test_pairs_of_ends_are_lines():

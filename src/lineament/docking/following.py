@@ -7,6 +7,7 @@ from .._copies import InTurn, in_turn
 from ..features import Features
 from ..motion.tracker import Tracks
 from ..scan import Array, Pose
+from ..scan.fields import checked_pose
 from ..scan.poses import compose, inverse
 from .search import find_shape
 from .shape import Shape, ShapePose
@@ -45,7 +46,8 @@ class ShapeDock(InTurn):
 
     def __init__(self, shape: Shape, point: Sequence[float]) -> None:
         self.shape = shape
-        self._first: Pose = (point[0], point[1], 0.0)
+        x, y = point
+        self._first: Pose = checked_pose((x, y, 0.0), "point")
         self._last: Pose | None = None
         self._missed = 0
 

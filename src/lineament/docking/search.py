@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
+from ..features.features import scan_of
 from ..scan import Array, LaserScan, Pose, RangeNoise
+from ..scan.fields import checked_pose
 from ..scan.poses import compose
 from .fitting import SIGMAS, Beams, Fit, beams_of, fit
 from .shape import Shape, ShapePose
@@ -15,6 +17,8 @@ from .shape import Shape, ShapePose
 #: Steps in which a shape is looked for around a guess [m, rad], no wider than a foot of a pallet;
 #: starts that are fitted.
 _STEP, _TURN, _STARTS = 0.1, math.radians(15), 16
+#: A guess is no farther off, unless it is in millimetres [m, m, rad].
+_FARTHEST = 10.0
 #: Points of a shape that are compared with so many of the scan, none worse than so far off [m].
 _SAMPLES, _POINTS, _WORST = 32, 120, 0.3
 #: Noise where a scan has none that is known.
@@ -63,15 +67,15 @@ def find_shape(
     Raises
     ------
     ValueError
-        If the features have no scan.
+        If the features have no scan, or the guess or its reach make no sense.
 
     Examples
     --------
     See `lineament.docking`.
     """
-    scan = features.scan if scan is None else scan
-    if scan is None:
-        raise ValueError("the features have no scan, expected it as an argument")
+    scan, guess = scan_of(features, scan), checked_pose(guess, "guess")
+    if not all(0 <= part <= _FARTHEST for part in checked_pose(reach, "reach")):
+        raise ValueError(f"reach is {reach}, expected 0 to {_FARTHEST:g} [m, m, rad]")
     beams = beams_of(scan, features.noise or _USUAL)
     found = (fit(beams, shape, start) for start in _starts(beams, shape, guess, reach))
     fits = [one for one in found if one is not None and _is_within(one.pose, guess, reach)]

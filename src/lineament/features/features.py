@@ -252,3 +252,19 @@ def _records(table: NDArray[np.void]) -> list[dict[str, Any]]:
     """List the records of a structured array as dicts of plain lists and numbers."""
     columns = {name: table[name].tolist() for name in table.dtype.names or ()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def checked_features(features: Any) -> Features:
+    """Return features; a TypeError for anything else, as a scan."""
+    if not isinstance(features, Features):
+        kind = type(features).__name__
+        raise TypeError(f"features is of type {kind}, expected Features: what extract returns")
+    return features
+
+
+def scan_of(features: Features, scan: LaserScan | None = None) -> LaserScan:
+    """Return the scan that is given, or that of the features; a ValueError without one."""
+    scan = checked_features(features).scan if scan is None else scan
+    if scan is None:
+        raise ValueError("the features have no scan, expected it as an argument")
+    return scan

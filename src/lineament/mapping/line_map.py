@@ -67,8 +67,8 @@ class LineMap(ReadOnly):
         *,
         sigma: float = 0.0,
     ) -> None:
-        if not 0 <= sigma < math.inf:
-            raise ValueError(f"sigma is {sigma}, expected a length ≥ 0")
+        if not 0 <= sigma < 1:
+            raise ValueError(f"sigma is {sigma}, expected less than 1 in metres, and ≥ 0")
         columns = np.zeros(0, COLUMN) if columns is None else columns
         ends = np.concatenate((walls["start"], walls["end"]), axis=1)
         finite = np.isfinite(ends).all(axis=1)

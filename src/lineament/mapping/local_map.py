@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
 from ..features import Features
+from ..features.features import scan_of
 from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
@@ -205,9 +206,10 @@ class _Sight:
 
 def query_of_scan(features: Features, scan: LaserScan | None = None) -> Query:
     """Return walls and beams of one scan."""
+    beams = thinned(beams_of(features, scan))
     segments = features.segments[features.segments["length"] >= SHORTEST]
     _, _, walls, covariance = adjust([(0.0, 0.0, 0.0)], [], [(segments, np.arange(len(segments)))])
-    return Query(walls, covariance, thinned(beams_of(features, scan)))
+    return Query(walls, covariance, beams)
 
 
 def some(rows: NDArray[Any], count: int) -> NDArray[Any]:
@@ -229,9 +231,7 @@ def thinned(beams: Array) -> Array:
 
 def beams_of(features: Features, scan: LaserScan | None = None) -> Array:
     """Return the valid beams of a scan, shape (n, BEAM_COLUMNS)."""
-    scan = features.scan if scan is None else scan
-    if scan is None:
-        raise ValueError("the features have no scan, expected it as an argument")
+    scan = scan_of(features, scan)
     valid, noise = scan.valid, features.noise
     r, bearings = scan.ranges[valid], scan.angles[valid]
     beams = np.zeros((len(r), BEAM_COLUMNS))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..features import Features
 from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
-from ..scan.fields import covariance_of_pose
+from ..scan.fields import checked_pose, covariance_of_pose
 from ..walls import lengths_of, unit, wrapped
 from .evidence import ON_DRAWING, Evidence, evidence_of, on_map, over_chance
 from .hypotheses import BOX, TURN, agreement, hypotheses, image_of, spectrum
@@ -141,12 +141,14 @@ def locate(
     """
     if guess is None and covariance is not None:
         raise ValueError("a covariance is given without a guess, which it would be that of")
+    if not isinstance(plan, LineMap):
+        raise TypeError(f"plan is of type {type(plan).__name__}, expected LineMap: LineMap.read")
     if isinstance(query, LocalMap):
         query = query.query()
-    elif isinstance(query, Features):
+    elif not isinstance(query, Query):
         query = query_of_scan(query, scan)
     if guess is not None:
-        return located_near(query, plan, guess, covariance)
+        return located_near(query, plan, checked_pose(guess, "guess"), covariance)
     where = _anywhere(query, plan)
     if where or not plan.is_mapped:
         return where

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import TABLES, Features
+from ..features.features import checked_features
 from ..motion.association import chi_square
 from ..scan import LaserScan, Pose
 from ..scan.poses import carried, compose, inverse
@@ -79,7 +80,7 @@ def merge_features(
     >>> merged.segments["length"].round(2).tolist(), merged.segments["n_points"].tolist()
     ([0.2], [18])
     """
-    scans = [found.scan for found in features if found.scan is not None]
+    scans = [found.scan for found in map(checked_features, features) if found.scan is not None]
     if not features or len(features) != len(mountings):
         raise ValueError(
             f"{len(mountings)} mountings of {len(features)} features, expected one each"

@@ -221,23 +221,20 @@ def beam_at_stamp(beam: str | float, n: int, is_clockwise: bool) -> float:
     return finite("stamp_beam", beam)
 
 
-def checked_pose(pose: Any) -> Pose:
+def checked_pose(pose: Any, name: str = "pose") -> Pose:
     """Three finite numbers."""
     try:
         x, y, theta = pose
-        return finite("pose", x), finite("pose", y), finite("pose", theta)
+        return finite(name, x), finite(name, y), finite(name, theta)
     except TypeError:
-        raise ValueError(f"pose is {pose!r}, expected (x, y, theta)") from None
+        raise ValueError(f"{name} is {pose!r}, expected (x, y, theta)") from None
     except ValueError:
-        raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
+        raise ValueError(f"{name} is {pose!r}, expected three finite numbers") from None
 
 
 def checked_mounting(laser_pose: Any, name: str = "laser_pose") -> Pose:
     """Pose of the scanner on what poses are of: three finite numbers, the last an angle."""
-    try:
-        pose = checked_pose(laser_pose)
-    except ValueError as error:
-        raise ValueError(f"{name}{str(error).removeprefix('pose')}") from None
+    pose = checked_pose(laser_pose, name)
     if abs(pose[2]) > 2 * math.pi:
         raise ValueError(f"{name} has theta = {pose[2]:g} rad, more than a turn{DEGREES}")
     return pose
