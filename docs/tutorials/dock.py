@@ -101,5 +101,5 @@ print(f"within two standard deviations: {(np.abs(errors) < 2 * sigma).mean():.0%
 # ```
 #
 # The covariance is that of the noise alone. Real walls are not straight: the
-# field `misfit` of both segments says how far off they are, and
-# [live](../live.md#topics) what was measured on a robot.
+# field `misfit` of both segments says how far off they are.
+# [Live](../live.md#docking) also follows shapes, such as a V or a pallet.
