@@ -108,3 +108,18 @@ def test_a_rate_beyond_reading_does_not_hold_the_node(played, clock):
     source = played([7.0, 7.1], rate=1e6, loop=True)
     clock.step = 0.001
     assert max(len(source.receive(0.05)) for _ in range(100)) == 64
+
+
+@pytest.mark.parametrize(
+    ("topic", "count", "said"),
+    [
+        (None, 2, ["scans of a, b are played as one topic: log_topic chooses one of them"]),
+        ("b", 1, []),
+    ],
+)
+def test_scans_of_several_topics_become_one_and_a_line(tmp_path, clock, topic, count, said):
+    path = tmp_path / "units.json"
+    path.write_text('{"a": [[1.5, 0.1], [1.6, 0.2]], "b": [[1.5, 0.1], [1.6, 0.2]]}')
+    source = ReplaySource(path, clock=clock, topic=topic)
+    assert len(times(source, clock)) == count
+    assert source.problems() == said

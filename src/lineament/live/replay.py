@@ -97,6 +97,7 @@ class ReplaySource:
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
         # The first scan is due when it is first asked for.
         self._has_begun, self._due, self._topic, self._stamp = False, 0.0, "", math.nan
+        self._played: set[str] = set()
         #: Whether the log is at its end.
         self.ended = False
 
@@ -119,8 +120,14 @@ class ReplaySource:
         return came
 
     def problems(self) -> list[str]:
-        """Return what was skipped in the log."""
-        return [f"skipped: {fault}" for log in self._logs for fault in log.faults]
+        """Return what was skipped in the log, and that scans of several topics become one."""
+        found = [f"skipped: {fault}" for log in self._logs for fault in log.faults]
+        if len(self._logs) == 1 and len(self._played) > 1:
+            topics = ", ".join(sorted(self._played))
+            found.append(
+                f"scans of {topics} are played as one topic: log_topic chooses one of them"
+            )
+        return found
 
     def close(self) -> None:
         """Stop reading."""
@@ -155,6 +162,7 @@ class ReplaySource:
         assert self._next is not None
         (topic, scan), self._next = self._next, None
         self._topic, self._stamp = topic, scan.stamp
+        self._played.add(topic)
         # Latency counts from when the scan was due.
         return Received(topic, lambda: scan, self._due if self._rate else self._clock())
 
