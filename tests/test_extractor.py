@@ -66,6 +66,7 @@ def test_scans_that_differ_in_a_field_are_not_taken_for_each_other():
         ({"workers": 1.5}, r"workers is 1\.5"),
         ({"workers": True}, "workers is True"),
         ({"stamps": [1.0]}, r"stamps has shape \(1,\), expected \(2,\)"),
+        ({"stamps": [math.nan, 1.0]}, "stamps have one that is not finite, expected numbers"),
         ({"angle_min": None}, "angle_min and angle_increment, or angles"),
         ({"angle_increment": 0.0}, "angle_increment is 0"),
         ({"range_max": 0.0}, r"range_max is 0\.0"),

@@ -151,6 +151,8 @@ class Extractor:
         times = np.zeros(m) if stamps is None else np.array(numbers("stamps", stamps))
         if times.shape != (m,):
             raise ValueError(f"stamps has shape {times.shape}, expected ({m},), one for each row")
+        if not np.isfinite(times).all():
+            raise ValueError("stamps have one that is not finite, expected numbers [s]")
         frame = LaserScan(
             np.zeros(n),
             angle_min,
