@@ -112,6 +112,10 @@ def test_odometry_is_a_topic_in_the_namespace():
             for needed, given in NEEDED.items()
             for name, value in given.items()
         ),
+        *(
+            ({name: ""}, f"{name} is empty, expected a text, or no {name}")
+            for name in ("map", "mapping", "log", "log_topic", "poses", "dock_shape", "judge")
+        ),
         ({"mapping": "b.png"}, "mapping is 'b.png', expected an ending of .dxf"),
     ],
 )

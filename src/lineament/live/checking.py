@@ -72,6 +72,8 @@ def check(name: str, annotation: str, value: Any) -> None:
     kind, _, optional = annotation.partition(" | ")
     if optional and value is None:
         return
+    if optional and value == "":
+        raise ValueError(f"{name} is empty, expected a text, or no {name}")
     types, wanted = _KINDS[kind]
     is_known = isinstance(value, types)
     if not is_known or (isinstance(value, bool) and kind != "bool"):
