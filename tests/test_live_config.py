@@ -96,7 +96,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"merge": "rear"}, "merge is 'rear', expected names"),
         ({"merge": (7,)}, f"merge is (7,), {_NAME}"),
         ({**_TWO, "mountings": {"/b": (0, 0, 0)}}, "the mounting is of /b, expected one of"),
-        ({**_TWO, "mountings": {"/a": (0, 0)}}, "mounting of /a: pose is (0, 0), expected"),
+        ({**_TWO, "mountings": {"/a": (0, 0)}}, "mounting of /a is (0, 0), expected"),
         ({**_TWO, "mountings": {"/a": (0, 0, 90)}}, "mounting of /a has theta = 90 rad, more than"),
         ({**_TWO, "unsure": (-1, 0)}, "unsure is (-1, 0), expected two numbers"),
         ({**_TWO, "unsure": (1,)}, "unsure is (1,), expected two finite numbers"),

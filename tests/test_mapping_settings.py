@@ -21,7 +21,7 @@ SETTINGS = {
     "parts": {"_LEAST": 5.0},
     "evidence": {"RIGHT_ON_MAP": (0.84, 0.13, 0.03), "WRONG_ON_MAP": (0.19, 0.43, 0.38),
                  "OF_MAPS": ((0.80, 0.17, 0.03), (0.39, 0.33, 0.28)), "DENSITY": 0.3},
-    "following": {"DENIED": (0.12, 0.0), "SEEN": 1.0, "_TIGHT": 0.03},
+    "following": {"DENIED": 0.12, "SEEN": 1.0, "_TIGHT": 0.03},
     "gone": {"_PIECE": 0.5, "_BEAMS": 360, "_THROUGH": 2},
     "hypotheses": {"ALIKE": np.radians(12), "OF_ENDS": 0.5, "LEAST_TURN": 0.3, "BOX": 0.6,
                    "TURN": np.radians(12)},

@@ -248,8 +248,6 @@ class LiveConfig:
         if not self.merge:
             return
         _ = self.rig  # Its own errors say what is wrong with it.
-        for topic, pose in self.mountings.items():
-            checked_mounting(pose, f"mounting of {topic}")
         for name in ("laser_pose", "upside_down", "log_topic"):
             if getattr(self, name) not in ((0, 0, 0), False, None):
                 raise ValueError(f"{name} is of one scanner, expected none with several topics")

@@ -60,7 +60,8 @@ class Evidence:
         `Follower` it is over that at a wrong pose alone. Below 0 chance does as well.
     explained, short, contradicted : float
         Shares of the beams that end on a wall of the plan; before one, on something that the plan
-        does not have; and that have passed through a wall of the plan.
+        does not have; and that have passed through a wall of the plan, on a map that scans made
+        without ending on another.
     beams : int
         Number of beams.
     """

@@ -34,8 +34,8 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: otherwise takes back a part of one.
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says, nor is one
-#: that is no likelier there than by chance [nats].
-DENIED = 0.12, 0.0
+#: that is no likelier there than by chance.
+DENIED = 0.12
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -121,7 +121,6 @@ class Follower(InTurn):
 
     def __init__(self, plan: LineMap, way: float = 5.0) -> None:
         self.plan, self.way = plan, way
-        self._most, self._least = DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
         self._scan: LaserScan | None = None
@@ -252,7 +251,7 @@ class Follower(InTurn):
 
     def _is_denied(self, evidence: Evidence) -> bool:
         """Whether a scan is not of where the sensor is believed to be."""
-        is_doubtful = evidence.log_odds < self._least or evidence.contradicted > self._most
+        is_doubtful = evidence.log_odds < 0 or evidence.contradicted > DENIED
         return self.is_known and is_doubtful
 
     def _look(self, blurred: Array) -> Location:
@@ -272,7 +271,7 @@ class Follower(InTurn):
         # It takes more to leave a place than to believe it at first.
         odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
         least = 0.0 if self.plan.is_mapped else SURE
-        is_missed = found.verdict == LOST and (odds < least or contradicted > self._most)
+        is_missed = found.verdict == LOST and (odds < least or contradicted > DENIED)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         return self._found(found, blurred)
 

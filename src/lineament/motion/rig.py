@@ -11,7 +11,7 @@ import numpy as np
 from ..rosmsg.frames import Frames, Place, frame_of
 from ..rosmsg.poses import StampedPose
 from ..scan import Array, Pose
-from ..scan.fields import checked_pose
+from ..scan.fields import checked_mounting
 
 #: How well mountings are known, where nothing else is said: 1 cm and 0.5°, as by a ruler.
 UNSURE = 0.01, math.radians(0.5)
@@ -63,10 +63,7 @@ class Rig:
                 raise ValueError(
                     f"the mounting is of {topic}, expected one of {', '.join(self.topics)}"
                 )
-            try:
-                checked_pose(pose)
-            except ValueError as error:
-                raise ValueError(f"mounting of {topic}: {error}") from None
+            checked_mounting(pose, f"mounting of {topic}")
         if not all(0 <= part < math.inf for part in self.unsure):
             raise ValueError(f"unsure is {self.unsure}, expected two numbers ≥ 0 [m, rad]")
 
