@@ -64,10 +64,13 @@ class Mapped(NamedTuple):
     poses: list[Pose]
     logged: list[Pose]
 
-    def expected(self, place: Place, found: Pose) -> Pose:
-        """Return where a place is on the map, beside the scan that is nearest to a pose found."""
+    def expected(self, logged: Pose, found: Pose) -> Pose:
+        """Return where a pose of the log is on the map, beside the scan nearest to one found.
+
+        A map may show the same rooms twice, in two parts or where a loop is not closed.
+        """
         k = nearest(self.poses, found)
-        return compose(self.poses[k], relative(self.logged[k], place.pose))
+        return compose(self.poses[k], relative(self.logged[k], logged))
 
 
 def nearest(poses: list[Pose], to: Pose) -> int:
@@ -102,7 +105,7 @@ def surveyed(scans: list[ln.LaserScan]) -> tuple[Mapped, Mapped, list[Place]]:
 def looked_for(place: Place, on: Mapped) -> tuple[float, ...]:
     """Return the verdict, whether the best pose is right, and the shares of the beams there."""
     where = locate(place.query, on.plan)
-    x, y, turn = relative(on.expected(place, where.pose), where.pose)
+    x, y, turn = relative(on.expected(place.pose, where.pose), where.pose)
     of = where.evidence
     right = math.hypot(x, y) < RIGHT[0] and abs(turn) < RIGHT[1]
     return VERDICTS.index(where.verdict), right, of.explained, of.short, of.contradicted

@@ -156,23 +156,25 @@ class Robot:
 def real(name: str) -> str:
     """Follow a log on the grid of its map, as it is and carried away; return a row of the table."""
     scans = [scan for scan in open_log(DATA / LOGS[name]) if scan.pose is not None]
-    made, truth, _ = mapped(scans)
+    made = mapped(scans)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "map.yaml"
-        made.write(path)
+        made.plan.write(path)
         plan = LineMap.read(path)
     extract, rng = ln.Extractor(), np.random.default_rng(5)
     features = [extract(scan) for scan in scans]
     cells = [name]
     for carried in (False, True):
-        order = list(in_pieces(truth, rng)) if carried else [(k, False) for k in range(len(scans))]
+        order = (
+            list(in_pieces(made.poses, rng)) if carried else [(k, False) for k in range(len(scans))]
+        )
         follower, believed, verdicts, kidnapped = Follower(plan), HERE, [], []
         is_counted = was_right = False
         for i, (k, is_carried) in enumerate(order):
             if i and not is_carried:
                 believed = compose(believed, relative(scans[order[i - 1][0]].pose, scans[k].pose))
             where = follower(replace(features[k], stamp=0.5 * i), believed)
-            is_right = not _is_wrong(where.pose, truth[k])
+            is_right = not _is_wrong(where.pose, made.poses[k])
             lies = where.is_known and not is_right
             if is_carried:
                 is_counted = was_right
