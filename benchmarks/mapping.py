@@ -12,6 +12,7 @@ import math
 import os
 import sys
 import time
+import zipfile
 from itertools import islice, pairwise, permutations
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from lineament_lab.evaluation.icp import icp
 from lineament_lab.evaluation.maps import absolute_errors, doubled_walls
-from lineament_lab.evaluation.relations import read_relations
+from lineament_lab.evaluation.relations import Relations, read_relations
 from matplotlib.collections import LineCollection
 
 from lineament import Extractor
@@ -38,7 +39,7 @@ LOGS = {
     "fr079": ("truth/fr079_graph.npz", "../relations/fr079.relations"),
     "ACES": ("carmen/aces-corrected.log.gz", None),
     "CSAIL": ("carmen/csail-corrected.log.gz", None),
-    "Killian": ("graph/killian.g2o.zip", None),
+    "Killian": ("graph/killian.g2o.zip", "graph/killian.g2o.zip"),
 }
 COLUMNS = (
     "log",
@@ -52,6 +53,20 @@ COLUMNS = (
 )
 #: Errors of ICP from key frame to key frame [m, m, rad].
 ICP = np.diag((0.02, 0.02, 0.005)) ** 2
+
+
+def closures(path, stamps):
+    """Return the loop closures of a g2o in a zip, which its poses were corrected with."""
+    with zipfile.ZipFile(path) as packed:
+        name = next(name for name in packed.namelist() if name.endswith(".g2o"))
+        rows = [line.split() for line in packed.read(name).decode("latin-1").splitlines()]
+    vertices = [row[1] for row in rows if row[:1] == ["VERTEX_SE2"]]
+    number = {vertex: k for k, vertex in enumerate(vertices)}
+    edges = [row for row in rows if row[:1] == ["EDGE_SE2"]]
+    scans = np.array([[number[a], number[b]] for _, a, b, *_ in edges])
+    motions = np.array([row[3:6] for row in edges], float)
+    far = abs(np.diff(scans)[:, 0]) > 1
+    return Relations(scans[far], motions[far], abs(np.diff(stamps[scans])[:, 0])[far])
 
 
 def drive(scans, odometry):
@@ -278,7 +293,8 @@ def main() -> None:
             continue
         scans = list(open_log(DATA / path))
         stamps = np.array([scan.stamp for scan in scans])
-        verified = relations and read_relations(DATA / relations, stamps)
+        read = closures if relations == path else read_relations
+        verified = relations and read(DATA / relations, stamps)
         truth = [scan.pose for scan in scans]
         judged(name, "the log’s corrected poses", truth, truth, verified)
         found, made = rows(name, scans, truth, verified, chosen.odometry)

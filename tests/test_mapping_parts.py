@@ -263,23 +263,24 @@ def test_where_a_way_was_passed_before():
     poses = np.column_stack((np.tile(ring, (2, 1)), np.zeros(160)))
     survey = Survey([Frame() for _ in poses], poses, None, None)
     np.testing.assert_allclose(survey.way, 0.5 * np.arange(160))
-    # In the middle of the second round's first leg: there in the first round, by fours; within
-    # 2 m of way no other stretch is near. Nothing of the first 12 m was seen before.
-    assert survey._passed(90, 2.0) == [8]
-    assert survey._passed(93, 2.0) == [12]
-    assert survey._passed(24, 100.0) == []
-    assert survey._passed(25, 100.0) == [0]
-    # Within 11 m are stretches on either side; the two nearest of them.
+    # In the second round, the same place in the first; then the nearest at least 12 m of way from
+    # those before, here on both legs across. Nothing of the last 12 m was seen before.
+    assert survey._passed(90) == [10, 34, 65]
+    assert survey._passed(93) == [13, 68, 37]
+    assert survey._passed(24) == []
+    assert survey._passed(25) == [0]
+    # The three nearest of four stretches that pass.
     across = np.column_stack((np.arange(-10, 10, 0.5), np.full(40, 5.0), np.zeros(40)))
     poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
     survey = Survey([Frame() for _ in poses], poses, None, None)
-    assert survey._passed(160, 3.5) == [60, 100]
-    # Four key frames beyond reach between two that are within part no stretches; five do.
-    for apart, stretches in ((4, [0]), (5, [0, 8])):
-        near, far = np.zeros((3, 3)), np.tile((90.0, 0.0, 0.0), (apart, 1))
-        poses = np.concatenate((near, far, np.add(near, (0.1, 0, 0)), [(500.0, 0, 0)], near[:1]))
+    assert survey._passed(160) == [60, 100, 20]
+    # What comes back after 11.9 m is one stretch with what it left; after 12.1 m two. What is 25 m
+    # away was not passed.
+    for out, stretches in ((6.0, [0]), (6.1, [0, 2])):
+        places = [(0.0, 0.0), (out, 0.0), (0.1, 0.0), (500.0, 0.0), (0.0, 25.0), (0.0, 0.0)]
+        poses = np.column_stack((places, np.zeros(6)))
         survey = Survey([Frame() for _ in poses], poses, None, None)
-        assert survey._passed(len(poses) - 1, 2.0) == stretches
+        assert survey._passed(5) == stretches
     # Where it was lost, what was seen before is far.
     frames = [Frame(k == 10) for k in range(20)]
     survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)
@@ -339,4 +340,4 @@ def test_each_stretch_of_the_way_that_passed_near_is_looked_at():
     places = np.concatenate((first, away, second, away, [(0.0, 0.0)]))
     poses = np.column_stack((places, np.zeros(len(places))))
     survey = Survey([Frame() for _ in poses], poses, None, None)
-    assert survey._passed(len(poses) - 1, 2.0) == [40, 8]
+    assert survey._passed(len(poses) - 1) == [40, 8]

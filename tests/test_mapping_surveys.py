@@ -63,16 +63,26 @@ def test_what_shows_fewer_than_four_walls_is_not_looked_for(survey):
     assert len(query.walls) == 4
 
 
+def twice(survey, drift=0.0):
+    """The way there and back again, so that 12 m later all is passed once more.
+
+    From key frame 28 on poses are off by the drift [m], and so are the walls that are seen.
+    """
+    longer, every = np.concatenate([np.arange(25), np.arange(23, -1, -1)]), np.arange(len(RING))
+    frames = [survey.frames[k] for k in longer]
+    walls = [segments_of(query_at(frame.scan.pose, PLAN).walls) for frame in frames]
+    sights = sights_of([(of, every + len(RING) * (k >= 28)) for k, of in enumerate(walls)])
+    sights["covariance"] = np.eye(2) * 1e-6
+    poses = survey.poses[longer]
+    poses[28:, 1] += drift
+    return Survey(frames, poses, sights, lines_of(sights, poses, 2 * len(RING)))
+
+
 def test_loops_are_closed_where_the_way_was_passed(survey):
     """At least 12 m of way before: nothing yet, and then the first key frame from the last one."""
     assert len(survey.loops((0.3, 0.06))) == 0
-    longer = np.concatenate([np.arange(25), np.arange(23, -1, -1)])
-    frames = [survey.frames[k] for k in longer]
-    seen = [(segments_of(query_at(f.scan.pose, PLAN).walls), np.arange(len(RING))) for f in frames]
-    poses = survey.poses[longer]
-    sights = sights_of(seen)
-    sights["covariance"] = np.eye(2) * 1e-6
-    loops = Survey(frames, poses, sights, survey.lines).loops((0.3, 0.06))
+    longer = twice(survey)
+    loops, poses = longer.loops((0.3, 0.06)), longer.poses
     assert len(loops) >= 3
     assert loops["loop"].all()
     way = 0.5 * np.arange(49)
@@ -83,6 +93,36 @@ def test_loops_are_closed_where_the_way_was_passed(survey):
         sigma = np.sqrt(np.diag(np.linalg.inv(information)))
         assert (sigma > (0.02, 0.02, 0.005)).all()
         assert (sigma < (0.03, 0.03, 0.0075)).all()
+
+
+def test_loops_are_looked_for_as_far_as_the_way_is_not_known(survey):
+    """All poses after 14 m are believed to be 6 m off: found if the way says that they may be."""
+    drifted, poses = twice(survey, 6.0), twice(survey).poses
+    assert len(drifted.loops((0.3, 0.06))) == 0
+
+    def known(pairs):
+        return (pairs[:, 1] >= 28)[:, None, None] * np.diag((4.0, 4.0, 0.1)) ** 2
+
+    loops = drifted.loops((0.3, 0.06), known)
+    assert len(loops) >= 3
+    assert (loops["ends"][:, 1] >= 28).all()
+    for (j, q), motion in loops[["ends", "motion"]].tolist():
+        np.testing.assert_allclose(np.add(poses[j], motion), poses[q], atol=0.02)
+
+
+def test_across_a_lost_key_frame_the_way_says_nothing(survey):
+    longer = twice(survey)
+    lost = SimpleNamespace(**{**vars(longer.frames[28]), "is_torn": True})
+    frames = [*longer.frames[:28], lost, *longer.frames[29:]]
+    asked = []
+
+    def known(pairs):
+        asked.append(pairs)
+        return np.zeros((len(pairs), 3, 3))
+
+    Survey(frames, longer.poses, longer.sights, longer.lines).loops((0.3, 0.06), known)
+    ((before, after),) = (pairs.T for pairs in asked)
+    assert ((before < 28) == (after < 28)).all()
 
 
 def test_no_more_than_twelve_turns_are_tried():

@@ -1,5 +1,6 @@
 """Loops of a drive, and what follows a lost key frame put where it was seen before."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,8 @@ from .loops import FLOOR, Survey
 from .parts import between
 from .placing import PLACES
 
-#: Where loops are looked for at first, and once they are closed [m, rad].
+#: Loops are looked for so far off at first; once those are closed, so much farther than the graph
+#: says [m, rad]. Before, in bare corridors, it knows so little that wrong ones are found.
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Places agree if they are off the way between them by less, squared over its covariance and over
 #: that of a map that is not adjusted yet [m, m, rad].
@@ -32,7 +34,8 @@ def closed(
     for k, spread in enumerate(_SPREADS):
         if k:
             found = joined(frames, found, np.append(chain, loops), sights)
-        near = Survey(frames, found.poses, sights, found.lines).loops(spread)
+        known = partial(between, found.poses, solve=found.solver()) if k else None
+        near = Survey(frames, found.poses, sights, found.lines).loops(spread, known)
         if len(near):
             found = optimise(found.poses, np.append(chain, near), sights, count_of(sights))
             right = found.weights[len(chain) :] > 0.5

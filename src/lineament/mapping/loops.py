@@ -1,6 +1,6 @@
 """Loops: places that were seen before, found by `locate` alone."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,9 @@ from .locate import located_near
 _QUERY, _PLAN = 5.0, 5.0
 #: Key frames are looked for after so much way; others are at least so much way before them [m].
 _EVERY, _BEFORE = 2.0, 12.0
-#: Stretches of the way that are looked at for each; key frames whose beams a query has.
-_STRETCHES, _SCANS = 2, 6
+#: Stretches of the way that are looked at for each, which may have passed so near, beside what is
+#: not known, and at most [m]; key frames whose beams a query has.
+_STRETCHES, _NEAR, _FARTHEST, _SCANS = 3, 2.0, 25.0, 6
 #: Errors of a loop beside those that `locate` knows [m, rad].
 FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
 
@@ -78,35 +79,54 @@ class Survey:
             if query is not None:
                 yield q, query
 
-    def loops(self, spread: tuple[float, float]) -> Records:
-        """Look for what was seen before, near where the poses say that it is: records of `EDGE`.
+    def loops(
+        self, least: tuple[float, float], known: Callable[[Numbers], Array] | None = None
+    ) -> Records:
+        """Look for what was seen before, where the poses say that it is: records of `EDGE`.
 
-        The deviations [m, rad] are those of the poses from each other.
+        Poses are off by deviations of `least` [m, rad], and by what is `known` of the way: this
+        returns the covariances (m, 3, 3) of motions between pairs of key frames. It says nothing
+        across a lost one: what came before that is looked for by `least` alone.
         """
-        ends, motions, spreads, way = [], [], [], self.way
-        covariance = np.diag((spread[0], *spread)) ** 2
-        plans: dict[int, LineMap | None] = {}
-        for q, query in self.queries(_EVERY, np.arange(len(way))):
-            for j in self._passed(q, 2.0 + 2.0 * spread[0]):
-                if j not in plans:
-                    walls = self.walls(self.pose(j), np.flatnonzero(abs(way - way[j]) <= _PLAN))
-                    plans[j] = LineMap(walls) if len(walls) > 3 else None
-                if (plan := plans[j]) is not None:
-                    guess = relative(self.pose(j), self.pose(q))
-                    where = located_near(query, plan, guess, covariance, is_prior=True)
-                    if where:
-                        ends.append((j, q))
-                        motions.append(where.pose)
-                        spreads.append(where.covariance + FLOOR)
+        queries = dict(self.queries(_EVERY, np.arange(len(self.poses))))
+        every = [(j, q) for q in queries for j in self._passed(q)]
+        pairs = np.array(every, np.int64).reshape(-1, 2)
+        spans = np.cumsum([frame.is_torn for frame in self.frames])[pairs]
+        is_followed = spans[:, 0] == spans[:, 1]
+        covariances = np.tile(np.diag((least[0], *least)) ** 2, (len(pairs), 1, 1))
+        if known is not None:
+            covariances[is_followed] += known(pairs[is_followed])
+        reach = 2.0 * np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1])
+        away = np.hypot(*(self.poses[pairs[:, 0], :2] - self.poses[pairs[:, 1], :2]).T)
+        ends, motions, spreads = [], [], []
+        plans: dict[tuple[int, float], LineMap | None] = {}
+        for k in np.flatnonzero(away < _NEAR + reach).tolist():
+            # Numbers are rounded, so that queries that follow each other look at the same plans.
+            j, q = 4 * (int(pairs[k, 0]) // 4), int(pairs[k, 1])
+            of_plan = j, _PLAN * (1 + round(reach[k] / _PLAN))
+            if of_plan not in plans:
+                plans[of_plan] = self._plan(*of_plan)
+            if (plan := plans[of_plan]) is not None:
+                guess = relative(self.pose(j), self.pose(q))
+                where = located_near(queries[q], plan, guess, covariances[k], is_prior=True)
+                if where:
+                    ends.append((j, q))
+                    motions.append(where.pose)
+                    spreads.append(where.covariance + FLOOR)
         return edges_of(ends, motions, spreads, loop=True)
 
-    def _passed(self, q: int, reach: float) -> list[int]:
-        """Return the nearest key frame of each stretch of the way that passed near.
+    def _plan(self, j: int, reach: float) -> LineMap | None:
+        """Return the walls along so much of the way around a key frame, in its frame."""
+        way = self.way
+        walls = self.walls(self.pose(j), np.flatnonzero(abs(way - way[j]) <= reach))
+        return LineMap(walls) if len(walls) > 3 else None
 
-        Numbers are rounded, so that queries that follow each other look at the same plans.
-        """
+    def _passed(self, q: int) -> list[int]:
+        """Return the nearest key frames of stretches of the way that passed before."""
         way, away = self.way, np.hypot(*(self.poses[:, :2] - self.poses[q, :2]).T)
-        near = np.flatnonzero((away < reach) & (way < way[q] - _BEFORE))
-        runs = np.split(near, np.flatnonzero(np.diff(near) > 5) + 1) if len(near) else []
-        best = sorted((float(away[run].min()), int(run[away[run].argmin()])) for run in runs)
-        return [4 * (j // 4) for _, j in best[:_STRETCHES]]
+        chosen: list[int] = []
+        near = np.flatnonzero((away < _FARTHEST) & (way < way[q] - _BEFORE))
+        for j in near[np.argsort(away[near], kind="stable")].tolist():
+            if (abs(way[chosen] - way[j]) >= _BEFORE).all():
+                chosen.append(j)
+        return chosen[:_STRETCHES]

@@ -71,10 +71,7 @@ def parts_of(found: Adjusted, chain: Records, is_doubted: NDArray[np.bool_]) -> 
     n, solve = len(found.poses), found.solver()
     # What walls and loops add makes no motion less sure: most are sure by themselves.
     is_weak = ~_known(np.linalg.inv(chain["information"]), UNSURE)
-    pairs = chain["ends"][is_weak]
-    some = np.array_split(pairs, math.ceil(len(pairs) / _BATCH) or 1)
-    after = np.concatenate([between(found.poses, of, solve) for of in some])
-    is_weak[is_weak] = ~_known(after, UNSURE)
+    is_weak[is_weak] = ~_known(between(found.poses, chain["ends"][is_weak], solve), UNSURE)
     cuts = np.flatnonzero(is_weak | is_doubted[1:]) + 1
     runs = np.column_stack((np.append(0, cuts), np.append(cuts, n) - 1))
     steps = np.hypot(*np.diff(found.poses[:, :2], axis=0, prepend=found.poses[:1, :2]).T)
@@ -98,6 +95,11 @@ def parts_of(found: Adjusted, chain: Records, is_doubted: NDArray[np.bool_]) -> 
 
 def between(poses: Array, pairs: Numbers, solve: Callable[[Array], Array]) -> Array:
     """Covariances (m, 3, 3) of the motions between pairs of poses, the first of each its frame."""
+    some = np.array_split(pairs, math.ceil(len(pairs) / _BATCH) or 1)
+    return np.concatenate([_between(poses, of, solve) for of in some])
+
+
+def _between(poses: Array, pairs: Numbers, solve: Callable[[Array], Array]) -> Array:
     frames, at = np.unique(pairs, return_inverse=True)
     rows, k = 3 * frames[:, None] + np.arange(3), len(frames)
     units = np.zeros((3 * len(poses), 3 * k))
@@ -107,7 +109,8 @@ def between(poses: Array, pairs: Numbers, solve: Callable[[Array], Array]) -> Ar
     still = edges_of(pairs, np.zeros((len(pairs), 3)), np.tile(np.eye(3), (len(pairs), 1, 1)))
     both = np.concatenate(errors_of_motions(still, poses)[1:], axis=2)
     spreads = np.block([[joint[i, :, j] for j in (a, b)] for i in (a, b)])
-    return np.asarray(both @ spreads @ both.transpose(0, 2, 1))
+    found = both @ spreads @ both.transpose(0, 2, 1)
+    return np.asarray((found + found.transpose(0, 2, 1)) / 2)
 
 
 def _known(covariances: Array, most: float) -> NDArray[np.bool_]:
