@@ -9,6 +9,7 @@ import click
 
 from .options import LOG, PATH, QUIET, check_ending, extracting
 from .options import reading_odometry as reading
+from .types import Within
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 @click.option(
     "--track",
     "track_width",
-    type=click.FloatRange(0, 10, min_open=True),
+    type=Within(0, 10, min_open=True),
     metavar="METRES",
     help="Distance between the wheels by which the odometry was computed: radii and track are "
     "found instead of scales.",

@@ -25,6 +25,7 @@ from .options import (
     settings_of,
     wrong_usage,
 )
+from .types import Within
 
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report
@@ -99,7 +100,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--base-frame", metavar="FRAME", help="Frame of the robot.  [default: base_link]")
 @click.option(
     "--transform-tolerance",
-    type=click.FloatRange(0, 10),
+    type=Within(0, 10),
     help="For so long map → odom holds, in seconds.  [default: 1]",
 )
 @click.option("--broadcast/--no-broadcast", default=None, help="Publish map → odom on /tf.")
@@ -112,9 +113,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud in the log.")
 @click.option("--keep-going", **_FLAG, help="Skip what is faulty in the log.")
 @LIMITS
-@click.option(
-    "--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.  [default: 1]"
-)
+@click.option("--rate", type=Within(min=0), help="Factor on the speed; 0: no pauses.  [default: 1]")
 @click.option("--loop", **_FLAG, help="Start the log again at its end.")
 @click.option(
     "--foxglove",

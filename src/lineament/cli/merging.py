@@ -20,6 +20,7 @@ from .options import (
     wrong_usage,
 )
 from .options import reading_topics as reading
+from .types import Within
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 @BASE_FRAME
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0),
+    type=Within(min=0),
     metavar="SECONDS",
     help="Longest time between scans that are merged.  [default: 0.55 periods of the slowest]",
 )

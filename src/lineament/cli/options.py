@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..progress import compiling_said
+from .types import LogPlace, Place, Within
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
@@ -22,25 +23,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 _Command = Callable[..., None]
 
 
-class Place(click.Path):
-    """A path; none is meant by an empty one, which is what a variable that is not set gives."""
-
-    def convert(self, value: Any, parameter: Any, context: Any) -> Any:  # noqa: D102
-        if not value:
-            self.fail("is empty, expected a path", parameter, context)
-        return super().convert(value, parameter, context)
-
-
-class _LogPlace(Place):
-    """A log: a path, or an address such as s3://bucket/key."""
-
-    def convert(self, value: Any, parameter: Any, context: Any) -> Any:
-        # As a path, the two slashes of an address would become one.
-        return value if "://" in value else super().convert(value, parameter, context)
-
-
 PATH, TEXT_PATH = Place(path_type=Path), Place(path_type=str)
-LOG_PATH = _LogPlace(path_type=Path)
+LOG_PATH = LogPlace(path_type=Path)
 LOG = click.argument("log", type=LOG_PATH)
 SCAN = click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
 TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
@@ -115,7 +99,7 @@ _MOUNTINGS = click.option(
 )
 _UNSURE = click.option(
     "--unsure",
-    type=click.FloatRange(min=0),
+    type=Within(min=0),
     nargs=2,
     metavar="METRES DEGREES",
     callback=_turned_into(lambda given: given and (given[0], math.radians(given[1]))),
@@ -273,7 +257,7 @@ _SET = click.option(
 )
 _NOISE = click.option(
     "--noise",
-    type=click.FloatRange(min=0),
+    type=Within(min=0),
     metavar="SIGMA",
     help="Noise of the ranges [m].  [default: estimated from each scan]",
 )
