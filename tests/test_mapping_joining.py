@@ -44,7 +44,7 @@ def test_what_follows_a_lost_key_frame_goes_where_enough_places_agree(
     spreads = [loose if k + 1 in lost else sure for k in range(13)]
     chain = edges_of([(k, k + 1) for k in range(13)], [(1.0, 0, 0)] * 13, spreads)
 
-    def located(_, here, rest):
+    def located(_, here, rest, __):
         if here[0] != 6 or (is_late and 13 not in rest):
             return {}
         found = {q: (float(q), 3.0, 0.0) for q in range(6, 6 + agree)}

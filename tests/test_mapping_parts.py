@@ -263,10 +263,10 @@ def test_where_a_way_was_passed_before():
     poses = np.column_stack((np.tile(ring, (2, 1)), np.zeros(160)))
     survey = Survey([Frame() for _ in poses], poses, None, None)
     np.testing.assert_allclose(survey.way, 0.5 * np.arange(160))
-    # In the second round, the same place in the first; then the nearest at least 12 m of way from
-    # those before, here on both legs across. Nothing of the last 12 m was seen before.
-    assert survey._passed(90) == [10, 34, 65]
-    assert survey._passed(93) == [13, 68, 37]
+    # In the second round, the same place in the first; then the nearest at least 5 m of way from
+    # those before. Nothing of the last 12 m was seen before.
+    assert survey._passed(90) == [10, 0, 20]
+    assert survey._passed(93) == [13, 23, 3]
     assert survey._passed(24) == []
     assert survey._passed(25) == [0]
     # The three nearest of four stretches that pass.
@@ -274,9 +274,9 @@ def test_where_a_way_was_passed_before():
     poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
     survey = Survey([Frame() for _ in poses], poses, None, None)
     assert survey._passed(160) == [60, 100, 20]
-    # What comes back after 11.9 m is one stretch with what it left; after 12.1 m two. What is 25 m
+    # What comes back after 4.9 m is one stretch with what it left; after 5.1 m two. What is 25 m
     # away was not passed.
-    for out, stretches in ((6.0, [0]), (6.1, [0, 2])):
+    for out, stretches in ((2.5, [0]), (2.6, [0, 2])):
         places = [(0.0, 0.0), (out, 0.0), (0.1, 0.0), (500.0, 0.0), (0.0, 25.0), (0.0, 0.0)]
         poses = np.column_stack((places, np.zeros(6)))
         survey = Survey([Frame() for _ in poses], poses, None, None)

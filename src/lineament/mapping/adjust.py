@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import needed_by
+from ..progress import Track, untracked
 from ..scan import Array, Pose
 from ..walls import Numbers, Records, summed, wrapped
 from ..walls.sights import (
@@ -77,7 +78,7 @@ class Adjusted:
         """Return what multiplies columns (3n, k) by the covariance of the poses."""
         return _solver(self.matrix)
 
-    def with_poses(self, sights: Records) -> Records:
+    def with_poses(self, sights: Records, track: Track = untracked) -> Records:
         """Return the lines with covariances that hold those of the poses.
 
         Walls whose sights contradict each other are less sure, by their χ² (Birge).
@@ -90,7 +91,8 @@ class Adjusted:
         lines["covariance"] *= np.maximum(squares / freedom, 1.0)[:, None, None]
         # One inverse is quicker than a solution for each wall.
         solve = _inverse_of(self.matrix) if is_small else _solver(self.matrix)
-        for first in range(0, len(lines), _BATCH):
+        batches = range(0, len(lines), _BATCH)
+        for first in track(batches, "covariances of walls", batches):
             gain = self.gain[:, 2 * first : 2 * (first + _BATCH)]
             columns = gain.toarray()
             by_wall = columns.reshape(len(columns), -1, 2)

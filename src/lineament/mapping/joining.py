@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..progress import Track, untracked
 from ..scan.poses import compose, inverse, relative
 from ..walls import Numbers, Records
 from .adjust import Adjusted, edges_of, errors_of_motions, optimise
@@ -27,15 +28,19 @@ _FEWEST, _MORE = 2, 3
 
 
 def closed(
-    frames: list[KeyFrame], chain: Records, found: Adjusted, sights: Records
+    frames: list[KeyFrame],
+    chain: Records,
+    found: Adjusted,
+    sights: Records,
+    track: Track = untracked,
 ) -> tuple[Adjusted, Records, Records]:
     """Return the poses with their loops closed, these loops, and those that contradict them."""
     loops = refused = edges_of([], [], [])
     for k, spread in enumerate(_SPREADS):
         if k:
-            found = joined(frames, found, np.append(chain, loops), sights)
+            found = joined(frames, found, np.append(chain, loops), sights, track)
         known = partial(between, found.poses, solve=found.solver()) if k else None
-        near = Survey(frames, found.poses, sights, found.lines).loops(spread, known)
+        near = Survey(frames, found.poses, sights, found.lines).loops(spread, known, track)
         if len(near):
             found = optimise(found.poses, np.append(chain, near), sights, count_of(sights))
             right = found.weights[len(chain) :] > 0.5
@@ -43,7 +48,13 @@ def closed(
     return found, loops, refused
 
 
-def joined(frames: list[KeyFrame], found: Adjusted, edges: Records, sights: Records) -> Adjusted:
+def joined(
+    frames: list[KeyFrame],
+    found: Adjusted,
+    edges: Records,
+    sights: Records,
+    track: Track = untracked,
+) -> Adjusted:
     """Return the poses, with what follows each lost key frame where most of its places are.
 
     Places on the map of what came before agree as far as the way between them is known, in pairs.
@@ -56,7 +67,7 @@ def joined(frames: list[KeyFrame], found: Adjusted, edges: Records, sights: Reco
         for first, last in spans.copy():
             survey, here = Survey(frames, found.poses, sights, found.lines), every[first:last]
             rest = np.setdiff1d(every, here) if is_again else every[:first]
-            places = _located(survey, here, rest)
+            places = _located(survey, here, rest, track)
             chosen, at = _agreeing(places, found)
             if len(chosen) >= max(_FEWEST, _MORE * (len(places) - len(chosen))):
                 q = list(places)[at]
@@ -70,13 +81,13 @@ def joined(frames: list[KeyFrame], found: Adjusted, edges: Records, sights: Reco
     return found
 
 
-def _located(survey: Survey, frames: Numbers, others: Numbers) -> dict[int, Location]:
+def _located(survey: Survey, frames: Numbers, others: Numbers, track: Track) -> dict[int, Location]:
     """Return the key frames that are located on the walls that others see."""
     walls = survey.walls((0.0, 0.0, 0.0), others)
     if not len(walls):
         return {}
     plan = LineMap(walls)
-    every = ((q, locate(query, plan)) for q, query in survey.queries(PLACES, frames))
+    every = ((q, locate(query, plan)) for q, query in survey.queries(PLACES, frames, track))
     return {q: where for q, where in every if where}
 
 

@@ -1,11 +1,12 @@
 """Loops: places that were seen before, found by `locate` alone."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..progress import Track, untracked
 from ..scan import Array, Pose
 from ..scan.poses import relative
 from ..walls import Numbers, Records, moved
@@ -35,13 +36,16 @@ class Survey:
     poses: Array
     sights: Records
     lines: Records
+    _way: Array | None = field(default=None, init=False)
 
     @property
     def way(self) -> Array:
         """Way to each key frame [m]; where it was lost, what was seen before is far."""
-        steps = np.hypot(*np.diff(self.poses[:, :2], axis=0, prepend=self.poses[:1, :2]).T)
-        steps[[frame.is_torn for frame in self.frames]] = _BEFORE
-        return np.cumsum(steps)
+        if self._way is None:
+            steps = np.hypot(*np.diff(self.poses[:, :2], axis=0, prepend=self.poses[:1, :2]).T)
+            steps[[frame.is_torn for frame in self.frames]] = _BEFORE
+            self._way = np.cumsum(steps)
+        return self._way
 
     def pose(self, k: int) -> Pose:
         """Pose of a key frame."""
@@ -68,19 +72,27 @@ class Survey:
         blocks[np.arange(n), :, np.arange(n)] = walls["covariance"]
         return Query(walls, blocks.reshape(2 * n, 2 * n), thinned(np.concatenate(beams)))
 
-    def queries(self, every: float, frames: Numbers) -> Iterator[tuple[int, Query]]:
-        """Return those of some key frames that are the first of each so many metres of the way.
-
-        With each comes what was seen before it.
-        """
+    def each(self, every: float, frames: Numbers) -> list[int]:
+        """Return those of some key frames that are the first of each so many metres of the way."""
         first = np.flatnonzero(np.diff(np.floor(self.way / every), prepend=-1))
-        for q in np.intersect1d(first, frames).tolist():
+        found: list[int] = np.intersect1d(first, frames).tolist()
+        return found
+
+    def queries(
+        self, every: float, frames: Numbers, track: Track = untracked
+    ) -> Iterator[tuple[int, Query]]:
+        """Return what was seen before each of these key frames, behind its number."""
+        first = self.each(every, frames)
+        for q in track(first, "places", first):
             query = self.query(q)
             if query is not None:
                 yield q, query
 
     def loops(
-        self, least: tuple[float, float], known: Callable[[Numbers], Array] | None = None
+        self,
+        least: tuple[float, float],
+        known: Callable[[Numbers], Array] | None = None,
+        track: Track = untracked,
     ) -> Records:
         """Look for what was seen before, where the poses say that it is: records of `EDGE`.
 
@@ -88,8 +100,36 @@ class Survey:
         returns the covariances (m, 3, 3) of motions between pairs of key frames. It says nothing
         across a lost one: what came before that is looked for by `least` alone.
         """
-        queries = dict(self.queries(_EVERY, np.arange(len(self.poses))))
-        every = [(j, q) for q in queries for j in self._passed(q)]
+        pairs, covariances, reach = self._candidates(least, known)
+        ends, motions, spreads = [], [], []
+        plans: dict[tuple[int, float], LineMap | None] = {}
+        query, of_query = None, -1
+        for k in track(range(len(pairs)), "loops", pairs):
+            # Numbers are rounded, so that queries that follow each other look at the same plans.
+            j, q = 4 * (int(pairs[k, 0]) // 4), int(pairs[k, 1])
+            of_plan = j, _PLAN * (1 + round(reach[k] / _PLAN))
+            if of_plan not in plans:
+                plans[of_plan] = self._plan(*of_plan)
+            if q != of_query:
+                query, of_query = self.query(q), q
+            if (plan := plans[of_plan]) is not None and query is not None:
+                guess = relative(self.pose(j), self.pose(q))
+                where = located_near(query, plan, guess, covariances[k], is_prior=True)
+                if where:
+                    ends.append((j, q))
+                    motions.append(where.pose)
+                    spreads.append(where.covariance + FLOOR)
+        return edges_of(ends, motions, spreads, loop=True)
+
+    def _candidates(
+        self, least: tuple[float, float], known: Callable[[Numbers], Array] | None
+    ) -> tuple[Numbers, Array, Array]:
+        """Return pairs of key frames that may have passed the same place.
+
+        With them come the covariances of the motions between them, and two deviations [m].
+        """
+        asked = self.each(_EVERY, np.arange(len(self.poses)))
+        every = [(j, q) for q in asked for j in self._passed(q)]
         pairs = np.array(every, np.int64).reshape(-1, 2)
         spans = np.cumsum([frame.is_torn for frame in self.frames])[pairs]
         is_followed = spans[:, 0] == spans[:, 1]
@@ -98,22 +138,8 @@ class Survey:
             covariances[is_followed] += known(pairs[is_followed])
         reach = 2.0 * np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1])
         away = np.hypot(*(self.poses[pairs[:, 0], :2] - self.poses[pairs[:, 1], :2]).T)
-        ends, motions, spreads = [], [], []
-        plans: dict[tuple[int, float], LineMap | None] = {}
-        for k in np.flatnonzero(away < _NEAR + reach).tolist():
-            # Numbers are rounded, so that queries that follow each other look at the same plans.
-            j, q = 4 * (int(pairs[k, 0]) // 4), int(pairs[k, 1])
-            of_plan = j, _PLAN * (1 + round(reach[k] / _PLAN))
-            if of_plan not in plans:
-                plans[of_plan] = self._plan(*of_plan)
-            if (plan := plans[of_plan]) is not None:
-                guess = relative(self.pose(j), self.pose(q))
-                where = located_near(queries[q], plan, guess, covariances[k], is_prior=True)
-                if where:
-                    ends.append((j, q))
-                    motions.append(where.pose)
-                    spreads.append(where.covariance + FLOOR)
-        return edges_of(ends, motions, spreads, loop=True)
+        near = away < _NEAR + reach
+        return pairs[near], covariances[near], reach[near]
 
     def _plan(self, j: int, reach: float) -> LineMap | None:
         """Return the walls along so much of the way around a key frame, in its frame."""
@@ -127,6 +153,8 @@ class Survey:
         chosen: list[int] = []
         near = np.flatnonzero((away < _FARTHEST) & (way < way[q] - _BEFORE))
         for j in near[np.argsort(away[near], kind="stable")].tolist():
-            if (abs(way[chosen] - way[j]) >= _BEFORE).all():
+            if (abs(way[chosen] - way[j]) >= _PLAN).all():
                 chosen.append(j)
-        return chosen[:_STRETCHES]
+            if len(chosen) == _STRETCHES:
+                break
+        return chosen

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import NothingFoundError
+from ..progress import Track, untracked
 from ..scan import Array, Pose
 from ..scan.poses import compose
 from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
@@ -120,10 +121,13 @@ class DriveMap:
         return np.where(np.diff(numbers, prepend=0) == 0, steps, 0.0)
 
 
-def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
+def make_map(
+    frames: list[KeyFrame], scans: list[tuple[int, Pose]], track: Track = untracked
+) -> DriveMap:
     """Close the loops of a drive, and adjust poses and walls together.
 
-    Key frames and scans are those of `Drive`. NothingFoundError if there are no walls.
+    Key frames and scans are those of `Drive`. ``track(items, name, whole)`` yields what is looked
+    at and shows the progress. NothingFoundError if there are no walls.
     """
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
@@ -137,7 +141,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     found = optimise(poses, chain, sights, count_of(sights))
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
-    found, loops, refused = closed(frames, chain, found, sights)
+    found, loops, refused = closed(frames, chain, found, sights, track)
     if len(loops):
         weak = loops.copy()
         weak["information"] /= TWICE
@@ -152,7 +156,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
     found = optimise(found.poses, chain, sights, count_of(sights), held=parts.roots, rounds=2)
-    survey = Survey(frames, found.poses, sights, found.with_poses(sights))
+    survey = Survey(frames, found.poses, sights, found.with_poses(sights, track))
     walls = walls_by_part(survey, parts)
     frame_of = np.array([k for k, _ in scans], np.int64)
     every = [compose(survey.pose(k), pose) for k, pose in scans]

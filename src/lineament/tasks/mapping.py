@@ -136,7 +136,8 @@ def map_log(
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
     track : callable
-        ``track(items, name, whole)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans, and what is looked at then, and shows the
+        progress.
     **reading
         As for `lineament.open_log`.
 
@@ -184,7 +185,7 @@ def map_log(
         raise LogError(log.name, "has no scans, expected a drive")
     merged = None
     try:
-        made = make_map(drive.frames, drive.scans)
+        made = make_map(drive.frames, drive.scans, track)
         if plan is not None:
             found = placements(made, plan)
             merged = merge_onto(made, plan, found) if merge else None
