@@ -15,10 +15,10 @@ from lineament.cli.options import (
     SCAN,
     SEED,
     TOPIC,
-    Place,
     check_ending,
     wrong_usage,
 )
+from lineament.cli.types import Place
 
 
 @click.command()

@@ -107,7 +107,7 @@ class Survey:
         for k in track(range(len(pairs)), "loops", pairs):
             # Numbers are rounded, so that queries that follow each other look at the same plans.
             j, q = 4 * (int(pairs[k, 0]) // 4), int(pairs[k, 1])
-            of_plan = j, _PLAN * (1 + round(reach[k] / _PLAN))
+            of_plan = j, _PLAN * (1 + round(float(reach[k]) / _PLAN))
             if of_plan not in plans:
                 plans[of_plan] = self._plan(*of_plan)
             if q != of_query:
