@@ -399,6 +399,18 @@ def test_odometry_that_stands_while_the_scanner_moves_is_a_line(files, capsys, w
         assert (line in capsys.readouterr().err) == (way > 0 and pose == 0)
 
 
+@pytest.mark.usefixtures("files")
+@pytest.mark.parametrize("is_posed", [False, True])
+@pytest.mark.parametrize("command", ["extract a.npz -o a.csv", "map a.npz -o a.svg"])
+def test_a_laser_pose_that_moves_no_pose_is_a_line(capsys, command, is_posed):
+    driven = list(drive(room(), [(-2, 0), (2, 0)], SENSORS["lms181"], speed=1, rate=2))
+    save_log("a.npz", [scan if is_posed else scan.with_pose(None) for scan in driven])
+    for given in ([], ["--laser-pose", "0.1", "0", "0"]):
+        assert run([*command.split(), *given]) == 0
+        said = "a.npz: no scan has a pose: laser_pose moves none" in capsys.readouterr().err
+        assert said == (bool(given) and not is_posed)
+
+
 @pytest.mark.parametrize(("headings", "said"), [((0, 91, 183, 274), 3), ((0, 2, 4, -1.5), 0)])
 def test_headings_in_degrees_are_a_line(files, capsys, headings, said):
     scan = open_log(files / "log.npz").scan(0)

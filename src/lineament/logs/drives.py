@@ -25,7 +25,7 @@ def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
 
     Scanners share a topic if it returns to a frame that it left; a scanner may be renamed within a
     log. At the end of the log, a warning says if its poses, where they are `odometry`, are in other
-    units, or stand still while the scanner moves.
+    units, stand still while the scanner moves, or are not there, though they are to be moved.
     """
     if log.topic is None and len(log.topics) > 1:
         several = ", ".join(log.topics)
@@ -52,6 +52,8 @@ def _of_one_frame(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
             changes += not has_moved and _is_elsewhere(first, scan)
         yield scan
     name = one_line(log.name)
+    if odometry and not moved and any(log.options.laser_pose or ()):
+        warn(f"{name}: no scan has a pose: laser_pose moves none")
     if changes >= _CHANGES and not has_moved:
         warn(f"{name}: its odometry stands still, and the scanner does not: {_WAY_OUT}")
     _check_units(name, moved)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import LogError, NothingFoundError
+from ..errors import LogError, NothingFoundError, one_line, warn
 from ..extractor import Extractor, load_kernels
 from ..features import TABLES, Features, make_records
 from ..files import check_outputs
@@ -117,8 +117,8 @@ def extract_log(
     with writer:
         for topic, scan in track(log.measured(), Path(log.name).name, log):
             features = extractor(scan)
+            unplaced += scan.pose is None
             if world:
-                unplaced += scan.pose is None
                 features = in_world(features, scan)
             writer.write(features, scan, topic)
             topics[topic] = None
@@ -127,8 +127,10 @@ def extract_log(
             valid += int(np.count_nonzero(scan.valid))
             for name, count in features.counts().items():
                 found[name] += count
-        if unplaced and unplaced == scans:
+        if world and unplaced and unplaced == scans:
             raise LogError(log.name, "no scan has a pose, expected poses: of a bag, by their topic")
+    if reading.get("laser_pose") is not None and unplaced == scans:
+        warn(one_line(f"{log.name}: no scan has a pose: laser_pose moves none"))
     return Extraction(
         log=str(path),
         output=str(output),
@@ -138,7 +140,7 @@ def extract_log(
         invalid=1 - valid / beams if beams else 0.0,
         seconds=time.perf_counter() - started,
         skipped=log.skipped,
-        unplaced=unplaced,
+        unplaced=unplaced if world else 0,
         faults=list(log.faults),
     )
 
