@@ -106,7 +106,7 @@ def by_part(made, truth):
 
 def judged(name, about, poses, truth, relations, doubled=None, parts=1):
     cells = [name, about]
-    if relations is None:
+    if relations is None or parts > 1:  # parts lie beside each other
         cells += ["–"] * 4
     else:
         every, far = (of.errors(poses).summary() for of in (relations, relations.far_apart()))

@@ -129,7 +129,7 @@ def extract_log(
                 found[name] += count
         if world and unplaced and unplaced == scans:
             raise LogError(log.name, "no scan has a pose, expected poses: of a bag, by their topic")
-    if reading.get("laser_pose") is not None and unplaced == scans:
+    if any(reading.get("laser_pose") or ()) and unplaced == scans > 0:
         warn(one_line(f"{log.name}: no scan has a pose: laser_pose moves none"))
     return Extraction(
         log=str(path),
