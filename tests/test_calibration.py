@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -117,6 +118,13 @@ def test_what_a_drive_does_not_show_has_no_number(shapes, unknown):
     assert not set(found.unknown) & set(found.values)
     assert len(found.covariance) == len(found.values) == 6 - len(found.unknown)
     assert all("hardly" in why or "only" in why for why in found.unknown.values())
+
+
+def test_deviations_have_units():
+    units = {"x": " m", "y": " m", "theta": " rad", "way": "", "turn": "", "drift": " rad/m"}
+    found = calibrate(*drive_of([ARC] * 40, noise=(2e-3, 5e-4, 5e-3)))
+    for name, why in found.unknown.items():
+        assert re.fullmatch(rf"the drive shows it to ± [\d.]+{units[name]} only", why)
 
 
 def test_without_turns_the_radii_are_known_and_the_track_is_not():

@@ -116,8 +116,9 @@ def test_any_scan_stays_a_scan(ranges, twist, increment):
 
 
 def test_a_twist_must_be_finite():
-    with pytest.raises(ValueError, match=r"twist is .*, expected three finite"):
-        ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, time_increment=0.1), (NAN, 0.0, 0.0))
+    for times in ({"time_increment": 0.1}, {}):  # also where nothing is to be undone
+        with pytest.raises(ValueError, match=r"twist is .*, expected three finite"):
+            ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, **times), (NAN, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("twist", [(-1e6, 0.0, 0.0), (0.0, 1e6, 0.0), (0.0, 0.0, 1e6)])

@@ -174,3 +174,17 @@ def test_a_track_alone():
 def test_a_point_or_a_track(given):
     with pytest.raises(ValueError, match="expected a point or a track, one of them"):
         Dock(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ({"point": (math.nan, 0)}, "x of the point is nan, expected a finite number"),
+        ({"point": (1, 2, 3)}, r"point is \(1, 2, 3\), expected \(x, y\)"),
+        ({"point": 1.0}, r"point is 1.0, expected \(x, y\)"),
+        ({"track": -1}, "track is -1, expected ≥ 0"),
+    ],
+)
+def test_a_point_that_is_nowhere_is_refused(given, problem):
+    with pytest.raises(ValueError, match=problem):
+        Dock(**given)

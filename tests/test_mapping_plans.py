@@ -346,3 +346,11 @@ def test_a_scan_is_no_features():
 def test_pairs_of_ends_are_lines():
     pairs, rows = LineMap.from_lines(ROOM.reshape(-1, 2, 2)), LineMap.from_lines(ROOM)
     assert pairs.walls.tobytes() == rows.walls.tobytes()
+
+
+def test_what_is_no_record_of_a_wall_is_refused():
+    walls = LineMap.from_lines(ROOM).walls
+    with pytest.raises(TypeError, match="walls are no records of walls"):
+        LineMap(ROOM)
+    with pytest.raises(TypeError, match="columns are no records of columns"):
+        LineMap(walls, walls)

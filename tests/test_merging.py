@@ -269,6 +269,7 @@ def test_features_that_cannot_be_merged():
         ("0 mountings of 0 features", [], []),
         ("have no scan", moved, AT_ROBOT),
         ("three finite numbers", two, [(0, 0, 0), (math.nan, 0, 0)]),
+        ("theta = 180 rad, more than a turn", two, [(0, 0, 0), (0, 0, 180)]),
         ("covariance", two, AT_ROBOT, np.eye(2)),
     ):
         with pytest.raises(ValueError, match=problem):

@@ -136,3 +136,13 @@ def test_what_is_not_deskewed_adds_up():
         skew = of_pose @ skew + of_motion @ (np.array(motion) * motion[2] * 0.5 / (2 * math.pi))
         pose = compose(pose, motion)
         np.testing.assert_allclose(travel.covariance, spread + np.outer(skew, skew), rtol=1e-9)
+
+
+def test_stamps_that_are_no_time_are_refused_and_far_ones_are_not():
+    odometer, moving = Odometer(), tracks(Motion(0.1, 0.0, 0.1, SPREAD))
+    odometer(moving, 0.0)
+    with pytest.raises(ValueError, match="stamp is nan, expected a finite number"):
+        odometer(moving, math.nan)
+    travel = odometer(moving, 1e300, math.inf)
+    assert travel.pose[2] == pytest.approx(0.2)
+    assert np.isfinite(travel.twist_covariance).all()

@@ -186,3 +186,22 @@ def test_a_corridor_is_observed_along_itself_where_it_has_an_end(has_end):
         if not has_end:
             np.testing.assert_allclose(np.abs(motion.unobserved), [(1, 0, 0)], atol=0.05)
             assert motion.covariance[0, 0] == pytest.approx(WIDE[0, 0], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("motion", (math.nan, 0, 0)),
+        ("motion", (0, 0)),
+        ("roughness", -0.01),
+        ("roughness", math.inf),
+        ("covariance", np.full((3, 3), math.nan)),
+    ],
+)
+def test_numbers_that_are_none_are_refused(name, given):
+    nothing = Matches(features(), features(), NONE, NONE, NONE)
+    with pytest.raises(ValueError, match=f"{name} is .*, expected"):
+        associate(features(), features(), **{name: given})
+    name = {"motion": "prior"}.get(name, name)
+    with pytest.raises(ValueError, match=f"{name} is .*, expected"):
+        estimate_motion(nothing, **{name: given})

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import LineamentError
 from ..kernels.mapping.layout import list_walls
 from ..scan import Array
-from ..walls import rows_of, walls_of
+from ..walls import COLUMN, WALL, Records, rows_of, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -32,7 +33,26 @@ class Index(NamedTuple):
     members: NDArray[np.int64]
 
 
-def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float) -> Index:
+def within(walls: Records, columns: Records) -> tuple[Records, Records]:
+    """Return those walls and columns whose numbers are finite; an error if they are far away."""
+    for name, given, dtype in (("walls", walls, WALL), ("columns", columns, COLUMN)):
+        if getattr(given, "dtype", None) != dtype:
+            raise TypeError(f"{name} are no records of {name}: LineMap.from_lines takes numbers")
+    ends = np.concatenate((walls["start"], walls["end"]), axis=1)
+    finite = np.isfinite(ends).all(axis=1)
+    finite &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
+    whole = np.isfinite(columns["center"]).all(axis=1) & np.isfinite(columns["radius"])
+    whole &= np.isfinite(columns["covariance"]).all(axis=(1, 2)) & (columns["radius"] > 0)
+    places = np.concatenate((ends[finite].ravel(), columns["center"][whole].ravel()))
+    if (farthest := abs(places).max(initial=0.0)) > FARTHEST:
+        raise LineamentError(
+            f"the plan is {farthest:.4g} m from its origin, expected a building: "
+            "is it drawn in metres?"
+        )
+    return walls[finite], columns[whole]
+
+
+def make_index(walls: Records, columns: Records, sigma: float) -> Index:
     """List the walls by cells, with round columns as short walls behind them."""
     every = np.concatenate((walls, walls_of(rings(columns), side=1)))
     table, ends = rows_of(every), np.stack((every["start"], every["end"]), axis=1)

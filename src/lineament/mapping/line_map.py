@@ -21,7 +21,7 @@ from ..walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned
 from ..walls.sights import columns_shown, walls_shown
 from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
-from .index import FARTHEST, LONGEST, MAPPED, Index, make_index, rings
+from .index import LONGEST, MAPPED, Index, make_index, rings, within
 from .outlines import walls_of_grid
 from .plans import doubts, is_drawn_by_cad, read_table, unknown_plan
 from .svg_plans import read_svg
@@ -50,6 +50,8 @@ class LineMap(ReadOnly):
 
     Raises
     ------
+    TypeError
+        If walls or columns are not such records.
     LineamentError
         If no wall is left, or the plan is larger than a building can be.
 
@@ -70,19 +72,8 @@ class LineMap(ReadOnly):
         if not 0 <= sigma < 1:
             raise ValueError(f"sigma is {sigma}, expected less than 1 in metres, and ≥ 0")
         columns = np.zeros(0, COLUMN) if columns is None else columns
-        ends = np.concatenate((walls["start"], walls["end"]), axis=1)
-        finite = np.isfinite(ends).all(axis=1)
-        finite &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
-        whole = np.isfinite(columns["center"]).all(axis=1) & np.isfinite(columns["radius"])
-        whole &= np.isfinite(columns["covariance"]).all(axis=(1, 2)) & (columns["radius"] > 0)
-        self.left_out = int((~finite).sum() + (~whole).sum())
-        self.columns, rest = columns[whole], walls[finite]
-        places = np.concatenate((ends[finite].ravel(), self.columns["center"].ravel()))
-        if (farthest := abs(places).max(initial=0.0)) > FARTHEST:
-            raise LineamentError(
-                f"the plan is {farthest:.4g} m from its origin, expected a building: "
-                "is it drawn in metres?"
-            )
+        rest, self.columns = within(walls, columns)
+        self.left_out = len(walls) - len(rest) + len(columns) - len(self.columns)
         self.walls = rest[lengths_of(rest) > 1e-6]
         if not len(self.walls):
             raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")

@@ -12,6 +12,7 @@ from ..features import TABLES, Features
 from ..features.features import checked_features
 from ..motion.association import chi_square
 from ..scan import LaserScan, Pose
+from ..scan.fields import checked_mounting
 from ..scan.poses import carried, compose, inverse
 from ..walls import Numbers, Records
 from .merging import (
@@ -80,6 +81,7 @@ def merge_features(
     >>> merged.segments["length"].round(2).tolist(), merged.segments["n_points"].tolist()
     ([0.2], [18])
     """
+    mountings = [checked_mounting(mounting, "mounting") for mounting in mountings]
     scans = [found.scan for found in map(checked_features, features) if found.scan is not None]
     if not features or len(features) != len(mountings):
         raise ValueError(

@@ -13,6 +13,7 @@ from ..features.records import C_COVARIANCE, CORNER, SEGMENT
 from ..kernels.tracking.association import associate as kernel
 from ..kernels.tracking.association import move
 from ..scan import Array
+from ..scan.fields import at_least_0, checked_pose
 
 Pairs = NDArray[np.intp]
 
@@ -127,7 +128,8 @@ def associate(
     Raises
     ------
     ValueError
-        If the gate is not between 0 and 1, or the covariance has another shape.
+        If the gate is not between 0 and 1, the covariance has another shape, or a number is not
+        finite.
 
     Examples
     --------
@@ -138,9 +140,9 @@ def associate(
     """
     gates = chi_square(gate, 2), chi_square(gate, 3)
     spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
-    x, y, theta = map(float, motion)
+    expected, rough = checked_pose(motion, "motion"), at_least_0("roughness", roughness)
     frames = Frame.of(words_of(before)), Frame.of(words_of(now))
-    return Matches(before, now, *paired(*frames, (x, y, theta), spread, gates, float(roughness)))
+    return Matches(before, now, *paired(*frames, expected, spread, gates, rough))
 
 
 def paired(
@@ -175,10 +177,10 @@ def words_of(features: Features) -> Words:
 
 
 def matrix_of(covariance: ArrayLike) -> Array:
-    """Copy a covariance of (x, y, theta); ValueError if it has another shape than (3, 3)."""
+    """Copy a covariance of (x, y, theta); ValueError if it is not (3, 3) and finite."""
     matrix = np.array(covariance, dtype=np.float64, order="C")
-    if matrix.shape != (3, 3):
-        raise ValueError(f"covariance is {matrix.tolist()}, expected (3, 3), of (x, y, theta)")
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise ValueError(f"covariance is {matrix.tolist()}, expected (3, 3), finite")
     return matrix
 
 

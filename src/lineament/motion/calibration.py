@@ -25,6 +25,7 @@ _NAMES, _OF_WHEELS = ("x", "y", "theta", "way", "turn", "drift"), ("left", "righ
 #: What is not known better than this is not known at all: deviations, as the names.
 _KNOWN = {"x": 0.05, "y": 0.05, "theta": 0.035, "way": 0.03, "turn": 0.03, "drift": 0.03}
 _KNOWN |= {"left": 0.03, "right": 0.03, "track": 0.03}
+_UNITS = {"x": " m", "y": " m", "theta": " rad", "drift": " rad/m"}
 #: What goes with something that is not known by such a correlation is not known either.
 _COUPLED = 0.9
 #: Odometry of less than this share of the scanner's motions stands still.
@@ -243,7 +244,7 @@ def _unknown(
         why |= dict.fromkeys(("x", "y", "turn", "track"), "the drive hardly turns")
     for name, deviation in deviations.items():
         if deviation > _KNOWN[name] and name not in why:
-            why[name] = f"the drive shows it to ± {deviation:.2g} only"
+            why[name] = f"the drive shows it to ± {deviation:.2g}{_UNITS.get(name, '')} only"
     if "theta" in why:  # They turn with it.
         why = dict.fromkeys(("x", "y"), "the drive shows it only together with theta") | why
     names = list(deviations)

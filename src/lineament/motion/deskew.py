@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Array, LaserScan
+from ..scan.fields import checked_pose
 from ..scan.poses import Twist, poses_along
 
 #: Bearings that fall on each other are set apart by so much [rad].
@@ -75,7 +76,7 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     >>> deskew(scan, (1.0, 0.0, 0.0)).ranges.round(5).tolist()
     [2.0, 2.0, 2.0]
     """
-    if twist is None or not any(twist):
+    if twist is None or not any(checked_pose(twist, "twist")):
         return scan
     times = beam_times(scan)
     if times is None or not scan.valid.any():

@@ -1,6 +1,7 @@
 """Where a corner is and how it is turned: what a robot that docks steers by."""
 
 import math
+import operator
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from .._copies import InTurn, in_turn
 from ..features import Features
 from ..scan import Array, Pose
+from ..scan.fields import finite
 from ..scan.poses import compose, inverse
 from .tracker import Tracks
 
@@ -88,6 +90,11 @@ class Dock(InTurn):
     track : int, optional
         The corner of this track alone.
 
+    Raises
+    ------
+    ValueError
+        If both or none are given, or a number makes no sense.
+
     Examples
     --------
     >>> import lineament as ln
@@ -106,6 +113,14 @@ class Dock(InTurn):
     def __init__(self, point: Sequence[float] | None = None, *, track: int | None = None) -> None:
         if (point is None) == (track is None):
             raise ValueError("expected a point or a track, one of them")
+        if point is not None:
+            try:
+                x, y = point
+            except (TypeError, ValueError):
+                raise ValueError(f"point is {point!r}, expected (x, y)") from None
+            point = finite("x of the point", x), finite("y of the point", y)
+        if track is not None and operator.index(track) < 0:
+            raise ValueError(f"track is {track}, expected ≥ 0")
         #: The track that is followed; None before a corner is chosen.
         self.track = track
         self._point = point

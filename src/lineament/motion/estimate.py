@@ -10,6 +10,7 @@ from ..kernels.tracking.motion import NOT_POSITIVE, NOT_THERE
 from ..kernels.tracking.motion import estimate_motion as kernel
 from ..kernels.tracking.residuals import COLUMNS
 from ..scan import Array, Pose
+from ..scan.fields import at_least_0, checked_pose
 from ..scan.poses import Twist, twist_between
 from .association import Frame, Matches, Pairs, chi_square, matrix_of, words_of
 
@@ -102,8 +103,8 @@ def estimate_motion(
     Raises
     ------
     ValueError
-        If the covariance of the prior is not positive definite, or a pair is not of features that
-        are there.
+        If the covariance of the prior is not positive definite, a number is not finite, or a pair
+        is not of features that are there.
 
     Examples
     --------
@@ -119,10 +120,10 @@ def estimate_motion(
     ([0.1, 0.0, 0.05], True)
     """
     spread = _UNKNOWN if covariance is None else matrix_of(covariance)
-    x, y, theta = map(float, prior)
+    guess, rough = checked_pose(prior, "prior"), at_least_0("roughness", roughness)
     frames = Frame.of(words_of(matches.before)), Frame.of(words_of(matches.now))
     pairs = matches.segments, matches.corners, matches.arcs
-    return motion_by(*frames, pairs, (x, y, theta), spread, float(roughness))
+    return motion_by(*frames, pairs, guess, spread, rough)
 
 
 def motion_by(

@@ -7,6 +7,7 @@ import numpy as np
 
 from .._copies import InTurn, in_turn
 from ..scan import Array, Pose
+from ..scan.fields import finite
 from ..scan.poses import Twist, compose
 from .estimate import Motion
 from .tracker import FASTEST, Tracks
@@ -69,7 +70,8 @@ class Odometer(InTurn):
         `sweep` is how long the mirror takes for a circle, of a scan that is not deskewed [s]: inf
         where that is not known, and is taken to be the time from scan to scan; 0 if it is deskewed.
         """
-        motion, duration, self._stamp = tracks.motion, stamp - self._stamp, stamp
+        stamp, last = finite("stamp", stamp), self._stamp
+        motion, duration, self._stamp = tracks.motion, stamp - last, stamp
         twist, twist_covariance = (0.0, 0.0, 0.0), np.eye(3) * FASTEST**2
         if motion is not None:
             of_pose, of_motion = compose_jacobians(self._pose, motion.pose)
@@ -84,7 +86,7 @@ class Odometer(InTurn):
                 found = motion.twist(duration)
                 if all(abs(speed) <= FASTEST for speed in found):
                     twist, twist_covariance = found, covariance_of_twist(motion, duration)
-                    twist_covariance += np.outer(skew, skew) / duration**2
+                    twist_covariance += np.outer(skew / duration, skew / duration)
         covariance = self._covariance + np.outer(self._skew, self._skew)
         return Travel(self._pose, covariance, twist, twist_covariance)
 

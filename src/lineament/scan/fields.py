@@ -44,6 +44,14 @@ def finite(name: str, value: object) -> float:
     return given
 
 
+def at_least_0(name: str, value: object) -> float:
+    """Convert a finite number that is not negative to a float."""
+    given = finite(name, value)
+    if given < 0:
+        raise ValueError(f"{name} is {given:g}, expected ≥ 0")
+    return given
+
+
 def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
     """Copy `values` into a read-only float64 vector; what is masked or null is NaN."""
     if type(values) is np.ndarray and values.dtype is _FLOAT64:
