@@ -20,7 +20,7 @@ from lineament import LineamentError
 from lineament.drawings import UNITS
 from lineament.limits import LIMITS
 from lineament.mapping import LineMap, locate
-from lineament.mapping.line_map import FARTHEST, LONGEST
+from lineament.mapping.index import FARTHEST, LONGEST
 from lineament.simulation import SENSORS, World
 from lineament.simulation.buildings import office
 from lineament.simulation.raycast import cast_rays
