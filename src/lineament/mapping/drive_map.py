@@ -16,13 +16,11 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from ..walls import Numbers, as_walls, segments_of, wrapped
 from ..walls.sights import WHOLE, lines_of, sights_of, walls_along
-from .consistency import agreement
 from .evidence import Says, evidence_of
 from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .views import looked, views_of
 
 #: How surfaces are off straight lines [m].
 _ROUGHNESS = 0.01
@@ -50,18 +48,12 @@ _ROUNDS = 4
 _SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
 #: Beams that judge a pose; before, fewer beams, and how many poses they leave.
 _BEAMS, _SIFTED = 120, ((12, 100), (40, 32))
-#: Errors of beams and walls beside their covariances, where poses are tried, chosen and judged [m].
-#: Walls bow and step: where they are taken to be straighter, a robot that drives seems to stand.
-_WIDE, _FINAL, _TIGHT = 0.12, 0.07, 0.04
+#: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
+_WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
 _LOST = 0.38
-#: With less than this share of the ends that agree, of those that this scan and the last key frame
-#: can both see, it is lost too; all of them say so much of a pose [nats], beside beams on walls.
-_AGREE, _LAST = 0.75, 60.0
-#: Poses along what no wall shows, in deviations.
-_SLIDE = np.linspace(-2.5, 2.5, 11)
 #: Covariance of a motion of which nothing is known [m, m, rad].
 UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Covariance of a pose that beams found [m, m, rad].
@@ -131,9 +123,6 @@ class Drive(InTurn):
         self._numbers, self._next = np.empty(0, np.int64), 0
         self._gone: set[int] = set()
         self._first = 0
-        #: How far the last key frames have looked; the same as views in the frame of the last one.
-        self._far: list[Array] = []
-        self._views: Array
         #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its step.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
         self._step: Pose = (0.0, 0.0, 0.0)
@@ -215,9 +204,7 @@ class Drive(InTurn):
             few = some(beams, count)
             share = len(few) / max(len(beams), 1)
             known = -0.5 * share * squares_off(poses, prior, spread)
-            found = evidence_of(
-                poses, few, self._index, wide, _SAYS, before=known, apart=apart, views=self._views
-            )
+            found = evidence_of(poses, few, self._index, wide, _SAYS, before=known, apart=apart)
             return np.asarray(found[:, 0])
 
         for count, most in _SIFTED:
@@ -226,35 +213,24 @@ class Drive(InTurn):
         walls = as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
-        poses = np.concatenate((fine, _slid(motion, way), poses))
+        poses = np.concatenate((fine, poses))
         # The motion that was matched is preferred by a little.
-        fine_scores = scores(poses, _BEAMS, _FINAL)
+        fine_scores = scores(poses, _BEAMS, _TIGHT, apart=0.5)
         fine_scores[-1] += 0.5
-        few = np.append(distinct(poses[:-1], fine_scores[:-1], _APART, 12), len(poses) - 1)
-        agree = [self._agreement(scan, pose) for pose in poses[few].tolist()]
-        x, y, theta = poses[few[(fine_scores[few] + agree).argmax()]].tolist()
+        x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, spread)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
             walls_say = np.linalg.inv(motion.covariance) - np.linalg.inv(_NEAR)
             motion = replace(motion, covariance=np.linalg.inv(walls_say + np.linalg.inv(spread)))
-        matched, found = scores(np.array([motion.pose, best.pose]), _BEAMS, _FINAL)
-        matched += self._agreement(scan, motion.pose)
-        found += self._agreement(scan, best.pose)
+        matched, found = scores(np.array([motion.pose, best.pose]), _BEAMS, _TIGHT)
         if found > matched + 1.0:
             motion = best
-        is_lost = self._explained(motion, beams, _PASSED) < _LOST or self._evidence[0] < 0
-        return motion, is_lost or agreement(self.frames[-1].scan, scan, motion.pose) < _AGREE
-
-    def _agreement(self, scan: LaserScan, pose: Pose) -> float:
-        """Return what the last key frame says of a pose [nats]."""
-        share = agreement(self.frames[-1].scan, scan, pose)
-        return _LAST * (share if share == share else 0.85)
+        return motion, self._explained(motion, beams, _PASSED) < _LOST
 
     def _explained(self, motion: Motion, beams: Array, less: float) -> float:
         """Return the share of the beams that are explained, less those that pass through walls."""
-        at = np.array([motion.pose])
-        found = evidence_of(at, beams, self._index, _TIGHT, _SAYS, views=self._views)[0]
+        found = evidence_of(np.array([motion.pose]), beams, self._index, _TIGHT)[0]
         self._evidence = found
         return float(found[1] - less * found[3])
 
@@ -303,7 +279,6 @@ class Drive(InTurn):
         at, known = len(self.scans), (motion, self._spread, *found)
         key = KeyFrame(at, scan, features, walls, here, *known)
         self.frames.append(key)
-        self._far = [*self._far, looked(scan)][-REMEMBERED:]
         self._look_around()
 
     def _look_around(self) -> None:
@@ -313,7 +288,6 @@ class Drive(InTurn):
         seen = seen[~np.isin(seen["wall"], [*self._gone])]
         self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
         poses = np.array([relative(last.pose, frame.pose) for frame in frames])
-        self._views = views_of(poses, self._far[-len(frames) :])
         lines = lines_of(seen, poses, len(self._numbers))
         segments = segments_of(walls_along(seen, poses, lines, WHOLE))
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
@@ -335,14 +309,6 @@ def turned(covariance: Array, angle: float) -> Array:
     turn = np.eye(3)
     turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     return np.asarray(turn @ covariance @ turn.T)
-
-
-def _slid(motion: Motion, way: float) -> Array:
-    """Return poses along what no wall shows, to deviations of the expected one [m], (n, 3)."""
-    rows = motion.unobserved
-    ways = np.hypot(rows[:, 0], rows[:, 1])
-    along = rows[ways > 0.5] / ways[ways > 0.5, None]
-    return np.concatenate([motion.pose + way * k * along for k in _SLIDE.tolist()])
 
 
 def _likely_turns(around: Features, features: Features, expected: float, spread: float) -> Array:

@@ -32,9 +32,6 @@ _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
 TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
-#: Where no wall shows how far it goes, a motion goes on as it did: it is off by this share of what
-#: is expected while it is looked for, and by the same in each key frame of a run of such.
-EVEN = 0.25
 #: Surfaces that are so much off a common line are one wall [m].
 APART = 0.015
 #: A wall was seen by so many key frames.
@@ -139,7 +136,7 @@ def make_map(
     lines = lines_of(sights, poses, count_of(sights))
     frames = believed(Survey(frames, poses, sights, lines))
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
-    spreads = spreads_of(frames)
+    spreads = [spread_of(frame) for frame in frames[1:]]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
     found = optimise(poses, chain, sights, count_of(sights))
     rough = roughness(sights, found.poses, _ROUGH)
@@ -181,26 +178,17 @@ def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
     return walls
 
 
-def spreads_of(frames: list[KeyFrame]) -> list[Array]:
-    """Return the covariances of the motions between key frames, of which walls say nothing twice.
+def spread_of(frame: KeyFrame) -> Array:
+    """Return the covariance of the motion to a key frame, of which walls say nothing twice.
 
     What was expected before counts whole: odometry, or that the motion goes on. In a direction that
-    no wall shows nothing else holds the pose. On a run of n such motions without odometry all are
-    off by the same: n motions by n times as much, so that each has n times its variance.
+    no wall shows nothing else holds the pose.
     """
-    goes_on = np.array([not (f.has_odometry or f.is_torn or f.motion.observable) for f in frames])
-    run = np.cumsum(np.diff(goes_on, prepend=False))
-    shares = np.where(goes_on, EVEN**2 * np.bincount(run)[run], 1.0).tolist()
-    return [_spread(frame, share) for frame, share in zip(frames[1:], shares[1:], strict=True)]
-
-
-def _spread(frame: KeyFrame, share: float) -> Array:
-    """Return the covariance of a motion, with a share of that of what was expected."""
     if frame.is_torn:
         return UNKNOWN
     if frame.is_contradicted or frame.is_lost:
         return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
-    known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(share * frame.expected)
+    known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(frame.expected)
     return np.asarray(np.linalg.inv(known) + _LEAST)
 
 
