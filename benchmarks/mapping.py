@@ -69,6 +69,12 @@ def closures(path, stamps):
     return Relations(scans[far], motions[far], abs(np.diff(stamps[scans])[:, 0])[far])
 
 
+def backwards(scans):
+    """Return scans in the reverse order, with stamps that grow."""
+    last = scans[-1].stamp_ns
+    return [scan.stamped(scan.stamp_beam, last - scan.stamp_ns) for scan in scans[::-1]]
+
+
 def drive(scans, odometry):
     extract, found = Extractor(), Drive()
     for scan in scans:
@@ -275,6 +281,8 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=5.0, help="scans of it in a second")
     parser.add_argument("--log", choices=LOGS, help="this log alone")
     parser.add_argument("--odometry", action="store_true", help="the poses of the log are it")
+    parser.add_argument("--backwards", action="store_true", help="the last scan comes first")
+    parser.add_argument("--every", type=int, default=1, help="every so many scans alone")
     parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
     parser.add_argument("--floors", type=int, nargs="+", help="seeds of floors, each two one log")
     chosen = parser.parse_args()
@@ -291,7 +299,9 @@ def main() -> None:
     for name, (path, relations) in LOGS.items():
         if chosen.log not in (None, name) or not (DATA / path).exists():
             continue
-        scans = list(open_log(DATA / path))
+        scans = list(open_log(DATA / path))[:: chosen.every]
+        if chosen.backwards:
+            scans, relations = backwards(scans), None
         stamps = np.array([scan.stamp for scan in scans])
         read = closures if relations == path else read_relations
         verified = relations and read(DATA / relations, stamps)

@@ -123,6 +123,7 @@ def test_what_a_drive_does_not_show_has_no_number(shapes, unknown):
 def test_deviations_have_units():
     units = {"x": " m", "y": " m", "theta": " rad", "way": "", "turn": "", "drift": " rad/m"}
     found = calibrate(*drive_of([ARC] * 40, noise=(2e-3, 5e-4, 5e-3)))
+    assert set(found.unknown) == set(units)
     for name, why in found.unknown.items():
         assert re.fullmatch(rf"the drive shows it to ± [\d.]+{units[name]} only", why)
 

@@ -33,7 +33,7 @@ class Index(NamedTuple):
     members: NDArray[np.int64]
 
 
-def within(walls: Records, columns: Records) -> tuple[Records, Records]:
+def checked_records(walls: Records, columns: Records) -> tuple[Records, Records]:
     """Return those walls and columns whose numbers are finite; an error if they are far away."""
     for name, given, dtype in (("walls", walls, WALL), ("columns", columns, COLUMN)):
         if getattr(given, "dtype", None) != dtype:

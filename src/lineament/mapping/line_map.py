@@ -21,7 +21,7 @@ from ..walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned
 from ..walls.sights import columns_shown, walls_shown
 from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
-from .index import LONGEST, MAPPED, Index, make_index, rings, within
+from .index import LONGEST, MAPPED, Index, checked_records, make_index, rings
 from .outlines import walls_of_grid
 from .plans import doubts, is_drawn_by_cad, read_table, unknown_plan
 from .svg_plans import read_svg
@@ -72,7 +72,7 @@ class LineMap(ReadOnly):
         if not 0 <= sigma < 1:
             raise ValueError(f"sigma is {sigma}, expected less than 1 in metres, and ≥ 0")
         columns = np.zeros(0, COLUMN) if columns is None else columns
-        rest, self.columns = within(walls, columns)
+        rest, self.columns = checked_records(walls, columns)
         self.left_out = len(walls) - len(rest) + len(columns) - len(self.columns)
         self.walls = rest[lengths_of(rest) > 1e-6]
         if not len(self.walls):

@@ -129,7 +129,7 @@ def associate(
     ------
     ValueError
         If the gate is not between 0 and 1, the covariance has another shape, or a number is not
-        finite.
+        finite or a roughness negative.
 
     Examples
     --------

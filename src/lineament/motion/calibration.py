@@ -25,6 +25,7 @@ _NAMES, _OF_WHEELS = ("x", "y", "theta", "way", "turn", "drift"), ("left", "righ
 #: What is not known better than this is not known at all: deviations, as the names.
 _KNOWN = {"x": 0.05, "y": 0.05, "theta": 0.035, "way": 0.03, "turn": 0.03, "drift": 0.03}
 _KNOWN |= {"left": 0.03, "right": 0.03, "track": 0.03}
+#: What deviations are in; without, a share.
 _UNITS = {"x": " m", "y": " m", "theta": " rad", "drift": " rad/m"}
 #: What goes with something that is not known by such a correlation is not known either.
 _COUPLED = 0.9

@@ -103,8 +103,8 @@ def estimate_motion(
     Raises
     ------
     ValueError
-        If the covariance of the prior is not positive definite, a number is not finite, or a pair
-        is not of features that are there.
+        If the covariance of the prior is not positive definite, a number is not finite, the
+        roughness is negative, or a pair is not of features that are there.
 
     Examples
     --------

@@ -69,6 +69,7 @@ class Odometer(InTurn):
 
         `sweep` is how long the mirror takes for a circle, of a scan that is not deskewed [s]: inf
         where that is not known, and is taken to be the time from scan to scan; 0 if it is deskewed.
+        ValueError if the stamp is not finite.
         """
         stamp, last = finite("stamp", stamp), self._stamp
         motion, duration, self._stamp = tracks.motion, stamp - last, stamp
