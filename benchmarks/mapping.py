@@ -39,6 +39,7 @@ LOGS = {
     "fr079": ("truth/fr079_graph.npz", "../relations/fr079.relations"),
     "ACES": ("carmen/aces-corrected.log.gz", None),
     "CSAIL": ("carmen/csail-corrected.log.gz", None),
+    "Acapulco": ("carmen/acapulco-corrected.log.gz", None),
     "Killian": ("graph/killian.g2o.zip", "graph/killian.g2o.zip"),
 }
 COLUMNS = (
@@ -101,6 +102,15 @@ def placed(found, frames):
     return [compose(tuple(frames[k]), pose) for k, pose in found.scans]
 
 
+def wrong_steps(found, truth):
+    """Whether each step from scan to scan, but where it is lost, is off by over 0.3 m or rad."""
+    poses = placed(found, [frame.pose for frame in found.frames])
+    lost = [frame.index for frame in found.frames if frame.is_torn]
+    kept = np.setdiff1d(np.arange(1, len(poses)), lost).tolist()
+    off = [relative(relative(*truth[k - 1 : k + 1]), relative(*poses[k - 1 : k + 1])) for k in kept]
+    return [math.hypot(x, y) > 0.3 or abs(theta) > 0.3 for x, y, theta in off]
+
+
 def by_part(made, truth):
     """Way of each part [m], its ATE [m] where it is sure, and the deviation that it claims [m]."""
     part, is_sure = (of[made.frame_of] for of in (made.parts.numbers, made.parts.is_sure))
@@ -142,9 +152,10 @@ def rows(name, scans, truth, relations, odometry=False):
     judged(name, "`map`", made.poses, truth, relations, about, made.parts.count)
     judged(name, "ICP, the same loops", rival(found, made.loops), truth, relations)
     played = scans[-1].stamp - scans[0].stamp
-    lost = sum(frame.is_lost for frame in found.frames)
+    lost, wrong = sum(frame.is_lost for frame in found.frames), wrong_steps(found, truth)
     print(
         f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
+        f"{sum(wrong)} of {len(wrong)} steps off by over 0.3 m or rad, "
         f"{len(made.loops)} loops, {len(made.refused)} refused; played in {played:.0f} s; "
         f"{used:.1f} s of processor: {played / used:.1f} x; "
         f"{seconds:.1f} s by the clock: {played / seconds:.1f} x; not sure on "

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..kernels.mapping.beams import judge
 from ..scan import Array
 from .index import Index
+from .views import NO_VIEWS
 
 #: Shares of the beams that end on a wall of the plan, before one (furniture, people), and behind
 #: one, where the pose is right; and where it is one of those that corners suggest, but wrong.
@@ -25,6 +26,9 @@ DENSITY = 0.3
 TOGETHER = 3.0
 #: A wall explains beams past its end, and lets them pass so near to it [m].
 MARGIN, SHY = 0.05, 0.15
+#: Where nobody has looked, walls go on so far [m]; beams that end elsewhere there say nothing.
+#: Those that say something count as this share of all, or more.
+GOES_ON, _LEAST = 4.0, 0.2
 #: Gate of the kernel, and what a beam at the wall itself says more than one at the gate's mean.
 _EXPLAINED, _SHORT, _THROUGH = (
     math.log(right / wrong) for right, wrong in zip(RIGHT, WRONG, strict=True)
@@ -83,12 +87,14 @@ def evidence_of(
     before: ArrayLike = 0.0,
     best: float = -math.inf,
     apart: float = math.inf,
+    views: Array = NO_VIEWS,
 ) -> Array:
     """Judge poses (n, 3) by beams: log-likelihood ratios and the shares of the beams, (n, 4).
 
     `spread` is a deviation [m] that is added to those of beams and walls; `says`, what
     beams say [nats]; `before`, what is known of each pose already. The ratio
     is -inf where it cannot come as near to the `best`, of those and those before it, as `apart`.
+    With `views` of the plan (see `views_of`), shares are of the beams that end where these look.
     """
     found = np.zeros((len(poses), 4))
     found[:, 0] = before
@@ -96,10 +102,13 @@ def evidence_of(
         return found
     found[:, 0] *= TOGETHER
     of_beams = (*says[:3], spread**2, MARGIN + spread, SHY + spread)
-    settings = (*of_beams, best * TOGETHER, apart * TOGETHER)
-    judge(np.ascontiguousarray(poses), beams, *index, settings, says.opens, found)
+    settings = (*of_beams, best * TOGETHER, apart * TOGETHER, GOES_ON)
+    every = np.arange(len(index.walls) if len(views) else 0)
+    judge(np.ascontiguousarray(poses), beams, *index, settings, says.opens, views, every, found)
     found[:, 0] /= TOGETHER
-    found[:, 1:] /= max(beams[:, 6].sum(), 1e-12)
+    whole = max(beams[:, 6].sum(), 1e-12)
+    seen = np.maximum(found[:, 1:].sum(axis=1), _LEAST * whole) if len(views) else whole
+    found[:, 1:] /= np.reshape(seen, (-1, 1))
     return found
 
 

@@ -177,6 +177,8 @@ def hypotheses(local: Array, plan: Listed, by_turn: Array, most: int) -> Array:
     by how well the walls agree with the turn. Boxes in which votes are counted overlap by half.
     """
     n_turns, places = round(2 * math.pi / TURN), plan.anchors[:, :2]
+    if not len(local) or not len(places):
+        return np.empty((0, 3))
     reach = np.hypot(*local[:, :2].T).max(initial=0.0) + BOX
     low, high = places.min(axis=0) - reach, places.max(axis=0) + reach
     columns, rows = (np.ceil((high - low) / BOX).astype(int) + 1).tolist()

@@ -186,7 +186,7 @@ def located_near(
 
 def _anywhere(query: Query, plan: LineMap) -> Location:
     """Look for what was seen without a guess."""
-    poses, found = _searched(_tried(query.anchors, query, plan), query, plan)
+    poses, found = _searched(voted(query.anchors, query, plan), query, plan)
     if not len(poses):
         return Location(LOST, (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
     odds, where = found[0, 0], _judged(poses, found, query, plan, poses_on(plan))
@@ -196,7 +196,7 @@ def _anywhere(query: Query, plan: LineMap) -> Location:
         return replace(where, verdict=LOST)
     # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
     image = query.mirrored()
-    _, feigned = _searched(_tried(image_of(query.anchors), image, plan), image, plan, 0.0)
+    _, feigned = _searched(voted(image_of(query.anchors), image, plan), image, plan, 0.0)
     ahead = odds - feigned[:, 0].max(initial=-math.inf)
     if ahead < -SURE:
         return replace(where, verdict=LOST)
@@ -211,7 +211,7 @@ GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 
 
-def _tried(anchors: Array, query: Query, plan: LineMap) -> Array:
+def voted(anchors: Array, query: Query, plan: LineMap) -> Array:
     """Poses of a local map for which its anchors vote: corners and ends of walls."""
     by_turn = agreement(spectrum(query.walls), plan.spectrum)
     return hypotheses(anchors, plan.anchors, by_turn, TRIED)
@@ -225,7 +225,7 @@ def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap
     if np.prod(counts.astype(float)) <= TRIED:
         steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
-    tried = _tried(query.anchors, query, plan)
+    tried = voted(query.anchors, query, plan)
     return np.vstack((guess, tried[squares_off(tried, guess, spread) < 16.0]))
 
 

@@ -101,6 +101,19 @@ def _passes(walls, grid, begins, members, origin, end, direction, pose, shy, spr
     return False
 
 
+@helper
+def _was_seen(views, x, y, near):
+    """Whether a place lies before the end of a beam of one of the views, or so near behind it."""
+    bearings = views.shape[1] - 4
+    for k in range(len(views)):
+        dx, dy, c, s = x - views[k, 0], y - views[k, 1], views[k, 2], views[k, 3]
+        turn = math.atan2(c * dy - s * dx, c * dx + s * dy) / (2.0 * math.pi)
+        at = 4 + int(turn % 1.0 * bearings) % bearings
+        if math.sqrt(dx * dx + dy * dy) < views[k, at] + near:
+            return True
+    return False
+
+
 @kernel
 def judge(
     poses: Floats2,
@@ -109,8 +122,10 @@ def judge(
     grid: Floats1,
     begins: Ints1,
     members: Ints1,
-    settings: tuple[float, float, float, float, float, float, float, float],
+    settings: tuple[float, float, float, float, float, float, float, float, float],
     opens: bool,
+    views: Floats2,
+    every: Ints1,
     found: Floats2,
 ):
     """Sum up the evidence of beams for poses.
@@ -121,10 +136,15 @@ def judge(
 
     `settings`: log-likelihood ratio of a beam explained, short, and passing through; variance that
     is added to all; how far past a wall's end it explains, and how near to it a beam may pass [m];
-    the best one before; `apart`. `opens` is whether walls may be seen through: a beam that ends on
-    a wall is then explained, whatever it has passed.
+    the best one before; `apart`; how far walls go on where nobody has looked [m]. `opens` is
+    whether walls may be seen through: a beam that ends on a wall is then explained, whatever it has
+    passed.
+
+    `views` are rows of x, y, cos and sin of a pose from which the plan was seen, and how far, by
+    bearing; without any, all was seen. A beam that ends where none has looked is of no weight: it
+    says nothing, unless it ends where one of `every` wall goes on, for the pose.
     """
-    explained, short, through, spread, margin, shy, best, apart = settings
+    explained, short, through, spread, margin, shy, best, apart, reach = settings
     most, count = max(explained, short, through), len(beams)
     weights = 0.0
     for b in range(count):
@@ -169,6 +189,9 @@ def judge(
             elif is_there:
                 hits += weight
                 total += weight * max(explained - 0.5 * deviation, short)
+            elif len(views) and not _was_seen(views, ex, ey, margin):
+                deviation = _misfit(walls, every, ex, ey, direction, pose, reach, spread)
+                total += weight * max(explained - 0.5 * deviation, 0.0)
             else:
                 shorts += weight
                 total += weight * short

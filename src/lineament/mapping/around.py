@@ -1,0 +1,223 @@
+"""`Around`: the walls of the last metres of a drive, and where among them a scan was taken."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..features import Features
+from ..motion.association import associate
+from ..motion.estimate import Motion, estimate_motion
+from ..scan import Array, LaserScan, Pose
+from ..walls import as_walls, wrapped
+from .consistency import LEAST, agreement
+from .evidence import Says, evidence_of
+from .line_map import LineMap
+from .local_map import Query, beams_of, some
+from .locate import distinct, squares_off, voted
+from .refine import COARSE, FINE, refined
+
+#: How surfaces are off straight lines [m].
+ROUGHNESS = 0.01
+#: What a beam that passes through a wall says [nats], and what it takes off those explained; with
+#: it, what one says that is explained, and one that is short.
+_MILD, _PASSED = -0.8, 0.5
+_SAYS = Says(math.log(7 / 3) + 0.5, math.log(0.7), _MILD)
+_ROUNDS = 4
+#: With at least this share of the beams explained, less contradicted, a place is taken at once;
+#: more where the deviation of what is expected is larger than that [m].
+_SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
+#: Steps of a grid around the expected pose, to each side; farther than so many deviations off it,
+#: no pose is tried.
+_STEPS, _FARTHEST = 3, 5.0
+#: Beams that judge a pose; before, fewer beams, and how many poses they leave.
+_BEAMS, _SIFTED = 120, ((12, 150), (40, 32))
+#: Errors of beams and walls beside their covariances, where poses are tried, chosen and judged [m].
+#: Walls bow and step: where they are taken to be straighter, a robot that drives seems to stand.
+_WIDE, _FINAL, _TIGHT = 0.12, 0.07, 0.04
+#: Poses that are tried are so far from each other [m, rad]; so many are chosen from.
+_APART, _CHOSEN = (0.15, 0.06), 12
+#: Poses along what no wall shows, in deviations.
+_SLID = np.linspace(-2.5, 2.5, 11)
+#: What is expected is off by Student's distribution of 3 degrees of freedom, of this share of its
+#: deviations: most motions go on as they did, and some robots turn at once.
+USUAL, _FREEDOM = 0.5, 3.0
+#: With less than this share of the beams explained, less contradicted, the way is lost.
+_LOST = 0.38
+#: With less than this share of the ends that agree, of those that this scan and the last key frame
+#: can both see, it is lost too; if all agree, that says so much of a pose [nats], beside the walls.
+_AGREE, _LAST = 0.75, 60.0
+#: Another place is so far away [m, rad]; the way is lost if one is 55 times less likely, or more.
+_OTHER, _DOUBT = 0.3, 4.0
+#: Covariance of a pose that beams found [m, m, rad].
+_NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
+#: A plan of one wall where no beam ends [m], for where there are no walls.
+_NOWHERE = LineMap.from_lines([[999.0, 999.0, 999.1, 999.0]])
+
+
+class Sought(NamedTuple):
+    """A scan, what it sees, and the pose and covariance that are expected of it."""
+
+    scan: LaserScan
+    features: Features
+    beams: Array
+    prior: Pose
+    spread: Array
+
+    def known(self, poses: Array) -> Array:
+        """Return what is known of poses before anything is seen [nats], 0 for the expected one."""
+        squares = squares_off(poses, self.prior, USUAL**2 * self.spread)
+        return np.asarray(-0.5 * (_FREEDOM + 3.0) * np.log1p(squares / _FREEDOM))
+
+
+class Found(NamedTuple):
+    """Where a scan was taken, in the frame of the last key frame.
+
+    `by_beams` is the covariance of that by beams, where no wall shows all of it. `evidence` has log
+    odds and the shares of beams that are explained, short and contradicted.
+    """
+
+    motion: Motion
+    by_beams: Array | None
+    is_lost: bool
+    evidence: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Around:
+    """What is around the last key frame, in its frame.
+
+    Attributes
+    ----------
+    features : Features
+        The walls of the last key frames, and the corners of the last one.
+    scan : LaserScan
+        The last key frame.
+    views : ndarray, shape (n, 364)
+        From where the key frames have looked, and how far; see `views_of`.
+    plan : LineMap
+        The walls.
+    """
+
+    features: Features
+    scan: LaserScan
+    views: Array
+    plan: LineMap
+
+    @classmethod
+    def of(cls, features: Features, scan: LaserScan, views: Array) -> "Around":
+        """Return what is around by the features there."""
+        walls = as_walls(features.segments)
+        return cls(features, scan, views, LineMap(walls) if len(walls) else _NOWHERE)
+
+    def place(self, scan: LaserScan, features: Features, prior: Pose, spread: Array) -> Found:
+        """Find the pose by the walls; if it may be another, the one that explains most."""
+        sought = Sought(scan, features, some(beams_of(features, scan), _BEAMS), prior, spread)
+        motion = self._match(features, prior, spread)
+        evidence = self._evidence(motion, sought)
+        sure = _SURE if math.sqrt(spread[0, 0]) < _NARROW else _SURER
+        if evidence[1] - evidence[3] >= sure and motion.observable:
+            return Found(motion, None, False, evidence)
+        poses = self._searched(sought, motion)
+        nats = self._nats(sought, poses, _FINAL)
+        # The motion that was matched is preferred by a little.
+        nats[-1] += 0.5
+        few = np.append(distinct(poses[:-1], nats[:-1], _APART, _CHOSEN), len(poses) - 1)
+        poses, nats = poses[few], nats[few] + self._agreed(sought, poses[few])
+        is_doubted, by_beams = doubts(poses, nats, motion)
+        motion = self._best(sought, motion, poses[nats.argmax()])
+        evidence = self._evidence(motion, sought)
+        is_lost = evidence[1] - _PASSED * evidence[3] < _LOST or evidence[0] < 0 or is_doubted
+        is_lost |= agreement(self.scan, scan, motion.pose) < _AGREE
+        return Found(motion, None if motion.observable else by_beams, bool(is_lost), evidence)
+
+    def _match(self, features: Features, prior: Pose, spread: Array) -> Motion:
+        motion, matches = Motion(*prior, spread), None
+        for _ in range(_ROUNDS):
+            found = associate(
+                self.features, features, motion.pose, motion.covariance, roughness=ROUGHNESS
+            )
+            if matches is not None and found.same_as(matches):
+                break
+            matches = found
+            motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
+        return motion
+
+    def _evidence(self, motion: Motion, sought: Sought) -> Array:
+        """Return what beams say of a motion, `evidence` of `Found`."""
+        at, index = np.array([motion.pose]), self.plan.index
+        found = evidence_of(at, sought.beams, index, _TIGHT, _SAYS, views=self.views)
+        return np.asarray(found[0])
+
+    def _nats(self, sought: Sought, poses: Array, wide: float, count: int = _BEAMS) -> Array:
+        """Judge poses by so many of the beams, against that share of what is known before."""
+        few = some(sought.beams, count)
+        known = len(few) / max(len(sought.beams), 1) * sought.known(poses)
+        found = evidence_of(
+            poses, few, self.plan.index, wide, _SAYS, before=known, views=self.views
+        )
+        return np.asarray(found[:, 0])
+
+    def _agreed(self, sought: Sought, poses: Array) -> Array:
+        """Return what the last key frame says of poses [nats]; if it says nothing, a little."""
+        shares = [agreement(self.scan, sought.scan, (x, y, t)) for x, y, t in poses.tolist()]
+        return _LAST * np.nan_to_num(shares, nan=LEAST)
+
+    def _searched(self, sought: Sought, motion: Motion) -> Array:
+        """Return the poses that may be the right one, shape (n, 3); the last one is the motion."""
+        walls = as_walls(sought.features.segments)
+        query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), sought.beams)
+        tried = self._tried(sought, query)
+        for count, most in _SIFTED:
+            tried = tried[distinct(tried, self._nats(sought, tried, _WIDE, count), _APART, most)]
+        tried = np.concatenate((tried, [motion.pose]))
+        fine = refined(tried, query, self.plan.index, COARSE)[0]
+        fine = refined(fine, query, self.plan.index, FINE)[0]
+        slid = _SLID[:, None] * math.sqrt(sought.spread[0, 0])
+        along = [motion.pose + slid * np.append(u, 0.0) for u in open_ways(motion)]
+        return np.concatenate((fine, *along, tried))
+
+    def _tried(self, sought: Sought, query: Query) -> Array:
+        """Poses around the expected one, and those for which walls vote, shape (n, 3)."""
+        way, turn = np.sqrt(np.diag(sought.spread)[1:]).tolist()
+        steps = np.arange(-_STEPS, _STEPS + 1.0)
+        by = min(max(way, 0.1), 0.3), min(max(way, 0.1), 0.3), min(max(turn / 2, 0.05), 0.1)
+        of_axes = [at + k * steps for at, k in zip(sought.prior, by, strict=True)]
+        grid = np.stack(np.meshgrid(*of_axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        votes = voted(query.anchors, query, self.plan)
+        is_near = squares_off(votes, sought.prior, sought.spread) < _FARTHEST**2
+        return np.concatenate((grid, votes[is_near]))
+
+    def _best(self, sought: Sought, motion: Motion, pose: Array) -> Motion:
+        """Return the motion by what is matched near a pose, or that pose, if it is likelier."""
+        x, y, theta = pose.tolist()
+        best = Motion(x, y, theta, sought.spread)
+        if best.pose != motion.pose:
+            motion = self._match(sought.features, best.pose, _NEAR)
+            walls_say = np.linalg.inv(motion.covariance) - np.linalg.inv(_NEAR)
+            covariance = np.linalg.inv(walls_say + np.linalg.inv(sought.spread))
+            motion = replace(motion, covariance=covariance)
+        both = np.array([motion.pose, best.pose])
+        matched, found = self._nats(sought, both, _FINAL) + self._agreed(sought, both)
+        return best if found > matched + 1.0 else motion
+
+
+def open_ways(motion: Motion) -> Array:
+    """Return the directions in which no wall shows how far it goes, unit vectors (m, 2)."""
+    ways = np.hypot(*motion.unobserved[:, :2].T)
+    return np.asarray(motion.unobserved[ways > 0.5, :2] / ways[ways > 0.5, None])
+
+
+def doubts(poses: Array, nats: Array, motion: Motion) -> tuple[bool, Array]:
+    """Return whether another place may be right too, and the covariance of the best pose.
+
+    Along what no wall shows, the pose is known as well as it is likelier than others there.
+    """
+    off, along = poses - poses[nats.argmax()], open_ways(motion)
+    off[:, 2] = wrapped(off[:, 2])
+    across = off[:, :2] - off[:, :2] @ along.T @ along
+    is_other = (np.hypot(*across.T) > _OTHER) | (abs(off[:, 2]) > _OTHER)
+    shares = np.where(is_other, 0.0, np.exp(nats - nats.max()))
+    spread = _NEAR + (off.T * shares) @ off / shares.sum()
+    return bool((nats[is_other] > nats.max() - _DOUBT).any()), spread

@@ -1,0 +1,130 @@
+"""Where a scan is among the walls of the last metres: cases worked by hand, and real walls."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lineament import Extractor, LaserScan
+from lineament.mapping.around import Around, Sought, doubts, open_ways
+from lineament.mapping.views import looked, views_of
+from lineament.motion.estimate import Motion
+from lineament.simulation import SENSORS, World
+
+BESIDE = np.diag((0.05, 0.05, 0.02)) ** 2
+EXPECTED = np.diag((0.6, 0.6, 0.7)) ** 2
+
+
+def motion(unobserved=()):
+    return Motion(1.0, 0.0, 0.0, EXPECTED, np.array(unobserved, float).reshape(-1, 3))
+
+
+def seen(walls, pose):
+    """Return the scan and the features of a pose among walls, of 2 cm noise."""
+    scan = SENSORS["utm30lx"].scan(World(walls), pose, np.random.default_rng(1))
+    return scan, Extractor()(scan)
+
+
+def around(walls, pose=(0.0, 0.0, 0.0)):
+    scan, features = seen(walls, pose)
+    return Around.of(features, scan, views_of(np.zeros((1, 3)), [looked(scan)]))
+
+
+def test_the_ways_that_no_wall_shows():
+    np.testing.assert_allclose(open_ways(motion()), np.empty((0, 2)))
+    np.testing.assert_allclose(open_ways(motion([(0.8, 0.0, 0.6)])), [(1.0, 0.0)])
+    # A turn alone is no way.
+    np.testing.assert_allclose(open_ways(motion([(0.3, 0.0, 0.95)])), np.empty((0, 2)))
+    np.testing.assert_allclose(open_ways(motion(np.eye(3))), np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("other", "nats", "along", "is_doubted"),
+    [
+        ((1.2, 0.0, 0.0), 9.0, (), False),  # near: the same place
+        ((1.5, 0.0, 0.0), 6.1, (), True),
+        ((1.5, 0.0, 0.0), 5.9, (), False),  # more than 4 nats less likely
+        ((1.0, 0.0, 0.4), 6.1, (), True),
+        ((1.0, 0.0, 2 * math.pi + 0.2), 9.9, (), False),  # a turn is the same turn a round on
+        ((1.5, 0.0, 0.0), 9.9, [(1, 0, 0)], False),  # along what no wall shows
+        ((1.5, 0.4, 0.0), 9.9, [(1, 0, 0)], True),
+        ((1.5, 0.4, 0.0), 9.9, np.eye(3), False),
+        ((1.5, 0.4, 0.4), 9.9, np.eye(3), True),
+    ],
+)
+def test_another_place_that_is_about_as_likely_is_a_doubt(other, nats, along, is_doubted):
+    poses = np.array([(1.0, 0.0, 0.0), other])
+    assert doubts(poses, np.array((10.0, nats)), motion(along))[0] == is_doubted
+    assert doubts(poses[::-1], np.array((nats, 10.0)), motion(along))[0] == is_doubted
+
+
+def test_along_what_no_wall_shows_the_pose_is_known_as_well_as_it_is_likelier():
+    poses = np.array([(1.0, 0.0, 0.0), (1.4, 0.0, 0.0), (0.6, 0.0, 0.0), (1.0, 0.9, 0.0)])
+    nats = np.array((10.0, 10.0 - math.log(3), 10.0 - math.log(3), 9.9))
+    covariance = doubts(poses, nats, motion([(1, 0, 0)]))[1]
+    variance = 2 * 0.4**2 / 3 / (1 + 2 / 3)
+    np.testing.assert_allclose(covariance, BESIDE + np.diag((variance, 0, 0)), atol=1e-12)
+    far = doubts(poses, np.array((10.0, -90.0, -90.0, -90.0)), motion([(1, 0, 0)]))[1]
+    np.testing.assert_allclose(far, BESIDE, atol=1e-12)
+
+
+def test_what_is_expected_is_off_by_students_distribution():
+    scan, features = seen([[3, -2, 3, 2]], (0.0, 0.0, 0.0))
+    sought = Sought(scan, features, np.empty((0, 10)), (1.0, 0.0, math.pi), EXPECTED)
+    poses = np.array([(1.0, 0.0, -math.pi), (1.3, 0.0, math.pi), (1.0, 0.0, math.pi + 0.7)])
+    np.testing.assert_allclose(
+        sought.known(poses), [0.0, -3 * math.log(4 / 3), -3 * math.log(7 / 3)]
+    )
+
+
+CORRIDOR = [[-40, 1, 40, 1], [40, -1, -40, -1]]
+ROOM = [
+    *([-3, 2, 1, 2], [1, 2, 1, 3], [1, 3, 4, 3], [4, 3, 4, -2], [4, -2, -1, -2]),
+    *([-1, -2, -1, -2.5], [-1, -2.5, -3, -2.5], [-3, -2.5, -3, 2]),
+]
+
+
+@pytest.mark.parametrize("pose", [(0.9, 0.1, 0.2), (0.0, 0.0, -1.6), (-1.2, -0.5, 1.0)])
+def test_in_a_room_a_jump_is_found(pose):
+    found = around(ROOM).place(*seen(ROOM, pose), (0.3, 0.0, 0.0), EXPECTED)
+    assert not found.is_lost
+    assert found.by_beams is None
+    np.testing.assert_allclose(found.motion.pose, pose, atol=0.02)
+
+
+def test_a_room_that_is_alike_when_it_is_turned_is_a_doubt():
+    """Most of what is seen now, the first scan did not see: it looks 270° around."""
+    assert around(ROOM).place(*seen(ROOM, (0.0, 0.0, -2.5)), (0.3, 0.0, 0.0), EXPECTED).is_lost
+
+
+def test_in_a_bare_corridor_the_motion_goes_on_and_is_known_no_better():
+    found = around(CORRIDOR).place(*seen(CORRIDOR, (0.8, 0.1, 0.1)), (0.8, 0.0, 0.0), EXPECTED)
+    assert not found.is_lost
+    assert found.by_beams is not None
+    np.testing.assert_allclose(found.motion.pose[1:], (0.1, 0.1), atol=0.02)
+    assert 0.15 < math.sqrt(found.by_beams[0, 0]) < 0.6
+    assert found.by_beams[1, 1] < 0.06**2
+
+
+def test_a_door_in_the_corridor_shows_how_far():
+    doors = [
+        *([-40, 1, -3, 1], [-3, 1, -3, 1.3], [-3, 1.3, -2, 1.3], [-2, 1.3, -2, 1]),
+        *([-2, 1, 2.5, 1], [2.5, 1, 2.5, 1.2], [2.5, 1.2, 3.6, 1.2], [3.6, 1.2, 3.6, 1]),
+        *([3.6, 1, 40, 1], [40, -1, -40, -1]),
+    ]
+    found = around(doors).place(*seen(doors, (1.1, 0.1, 0.1)), (0.3, 0.0, 0.0), EXPECTED)
+    assert not found.is_lost
+    np.testing.assert_allclose(found.motion.pose, (1.1, 0.1, 0.1), atol=0.05)
+
+
+def test_elsewhere_it_is_lost():
+    other = [[-1, 1, 1, 1], [1, 1, 1.2, -0.9], [1.2, -0.9, -1, -1.2], [-1, -1.2, -1, 1]]
+    assert around(ROOM).place(*seen(other, (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), EXPECTED).is_lost
+
+
+def test_where_there_are_no_walls_it_is_lost():
+    scan = LaserScan(np.full(90, np.nan), -0.5, 0.01)
+    nothing = Around.of(Extractor()(scan), scan, views_of(np.zeros((1, 3)), [looked(scan)]))
+    found = nothing.place(scan, Extractor()(scan), (0.5, 0.0, 0.0), EXPECTED)
+    assert found.is_lost
+    np.testing.assert_allclose(found.motion.pose, (0.5, 0.0, 0.0))
