@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lineament import Extractor, LaserScan
-from lineament.mapping.around import Around, Sought, doubts, open_ways
+from lineament.mapping.around import Around, Sought, doubts, grid_around, open_ways
 from lineament.mapping.views import looked, views_of
 from lineament.motion.estimate import Motion
 from lineament.simulation import SENSORS, World
@@ -75,6 +75,28 @@ def test_what_is_expected_is_off_by_students_distribution():
     np.testing.assert_allclose(
         sought.known(poses), [0.0, -3 * math.log(4 / 3), -3 * math.log(7 / 3)]
     )
+
+
+def test_turns_and_places_that_are_tried():
+    """Seven places each way, by a deviation of 10 to 30 cm; seven turns, by half of one."""
+    for way, turn, step, angle in (
+        (0.02, 0.02, 0.1, 0.05), (0.2, 0.16, 0.2, 0.08), (9.0, 3.0, 0.3, 0.1)
+    ):  # fmt: skip
+        tried = grid_around((1.0, 2.0, 0.5), np.diag((way, way, turn)) ** 2)
+        assert len(tried) == 343
+        for column, (middle, by) in enumerate(((1.0, step), (2.0, step), (0.5, angle))):
+            expected = middle + by * np.arange(-3, 4)
+            np.testing.assert_allclose(np.unique(tried[:, column].round(9)), expected)
+
+
+def test_poses_near_the_expected_one_are_tried():
+    """Wherever within two deviations the pose is, one is tried within reach of refinement."""
+    rng, prior = np.random.default_rng(0), (0.2, -0.1, 0.3)
+    for way, turn in ((0.02, 0.02), (0.1, 0.1), (0.3, 0.2)):
+        tried = grid_around(prior, np.diag((way, way, turn)) ** 2)
+        for off in rng.uniform(-1, 1, (50, 3)) * (2 * way, 2 * way, min(2 * turn, 0.3)):
+            away = np.abs(tried - np.add(prior, off)) / (0.16, 0.16, 0.06)
+            assert away.max(axis=1).min() < 1
 
 
 CORRIDOR = [[-40, 1, 40, 1], [40, -1, -40, -1]]

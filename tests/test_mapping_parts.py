@@ -10,7 +10,7 @@ from small_room import scans_on
 
 from lineament import Extractor, Tracker
 from lineament.mapping import LocalMap, placing
-from lineament.mapping.drive_map import Drive, _likely_turns
+from lineament.mapping.drive_map import Drive
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import single
 from lineament.mapping.placing import is_enough, placed_on, surely_on
@@ -50,22 +50,6 @@ def test_a_short_part_of_a_bowed_wall_may_be_askew(turn, walls):
     )
     found = merged_walls(whole, part, rms=(0, 0.01), misfit=(0, 0.01))
     assert len({*found}) == walls
-
-
-@pytest.mark.parametrize("turned", [0.0, 0.4, -0.9])
-def test_the_likeliest_turns_are_those_near_the_expected_one(turned):
-    """In a square room four turns are as good; of two on either side, none is preferred."""
-    corners = np.array([(-2, -2), (2, -2), (2, 2), (-2, 2)], float)
-    ends = np.stack((corners, np.roll(corners, -1, axis=0)), axis=1)
-    around = features(segments=[segment(a, b, 0, 9) for a, b in ends.tolist()])
-    seen = around.transform(0.0, 0.0, -turned)
-    turns = _likely_turns(around, seen, turned, 0.1)
-    off = np.abs(np.remainder(turns - turned + math.pi, 2 * math.pi) - math.pi)
-    assert off[0] < math.radians(3)
-    assert np.round(off[:4] / (math.pi / 2)).tolist() == [0, 1, 1, 2]
-    wide = _likely_turns(around, seen, turned + math.pi / 4, 9.0)
-    off = np.remainder(wide - turned - math.pi / 4 + math.pi, 2 * math.pi) - math.pi
-    assert sorted(np.round(off[:2] / (math.pi / 4)).tolist()) == [-1, 1]
 
 
 def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
@@ -144,37 +128,12 @@ def begun():
     return placed, found
 
 
-def test_turns_and_places_that_are_tried():
-    """Five places each way, by a deviation of 10 to 30 cm; seven turns, by half of one."""
-    placed, found = begun()
-    for way, turn, step, angle in (
-        (0.02, 0.02, 0.1, 0.05), (0.2, 0.16, 0.2, 0.08), (9.0, 3.0, 0.3, 0.1)
-    ):  # fmt: skip
-        tried = placed._tried(found, (1.0, 2.0, 0.5), way, turn)
-        for column, middle in ((0, 1.0), (1, 2.0)):
-            expected = middle + step * np.arange(-2, 3)
-            np.testing.assert_allclose(np.unique(tried[:, column].round(9)), expected)
-        turns = np.unique(tried[:, 2].round(9))
-        assert {*(0.5 + angle * np.arange(-3, 4)).round(9)} <= {*turns}
-
-
-def test_poses_near_the_expected_one_are_tried():
-    """Wherever within two deviations the pose is, one is tried within reach of refinement."""
-    placed, found = begun()
-    rng, prior = np.random.default_rng(0), (0.2, -0.1, 0.3)
-    for way, turn in ((0.02, 0.02), (0.1, 0.1), (0.3, 0.2)):
-        tried = placed._tried(found, prior, way, turn)
-        for off in rng.uniform(-1, 1, (50, 3)) * (2 * way, 2 * way, min(2 * turn, 0.3)):
-            away = np.abs(tried - np.add(prior, off)) / (0.16, 0.16, 0.06)
-            assert away.max(axis=1).min() < 1
-
-
 def going(steps, pace, count=60):
     """A drive whose scans come at a pace, which went on by the same step from each to the next."""
     placed, _ = begun()
     for k in range(1, count + 1):
         x, y, theta = np.multiply(steps, k)
-        placed._go_on(pace * k, (x, y, theta))
+        placed._go_on(pace * k, (x, y, theta), np.eye(3), None)
         placed._last = pace * k, None, (x, y, theta)
     return placed
 
@@ -190,6 +149,14 @@ def test_without_odometry_a_drive_goes_on_as_it_did():
     wide = np.sqrt(np.diag(placed._expected(7.0, None)[1]))
     np.testing.assert_allclose(wide, (0.3 + 0.0153, 0.3 + 0.0153, 0.7), rtol=0.02)
     np.testing.assert_allclose(placed._expected(6.0, None)[1], spread, rtol=0.05)
+
+
+def test_a_step_is_believed_by_as_much_as_it_is_known_better_than_what_is_usual():
+    """Half of the deviation that is expected is usual; beams know the step as well."""
+    placed = going((0.05, 0.01, 0.0), 0.1)
+    usual = np.diag((0.1, 0.1, 0.2)) ** 2
+    placed._go_on(6.1, (61 * 0.05 + 0.02, 61 * 0.01, 0.04), 4.0 * usual, usual)
+    np.testing.assert_allclose(placed._step, (0.06, 0.01, 0.02), atol=1e-9)
 
 
 def test_a_robot_is_not_thought_to_go_on_faster_than_1_2_metres_a_second():

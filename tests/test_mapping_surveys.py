@@ -5,11 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from handmade import features, segment
 from small_room import RING, plan_of, query_at, scans_on
 
 from lineament import Extractor
-from lineament.mapping.drive_map import _likely_turns
 from lineament.mapping.loops import Survey
 from lineament.walls import segments_of
 from lineament.walls.sights import lines_of, sights_of
@@ -123,11 +121,3 @@ def test_across_a_lost_key_frame_the_way_says_nothing(survey):
     Survey(frames, longer.poses, longer.sights, longer.lines).loops((0.3, 0.06), known)
     ((before, after),) = (pairs.T for pairs in asked)
     assert ((before < 28) == (after < 28)).all()
-
-
-def test_no_more_than_twelve_turns_are_tried():
-    """Of forty walls that lead in any direction."""
-    turns = np.random.default_rng(0).uniform(0, 2 * math.pi, 40)
-    walls = [segment((k, 0), (k + math.cos(t), math.sin(t)), 0, 9) for k, t in enumerate(turns)]
-    seen = features(segments=walls)
-    assert len(_likely_turns(seen, seen, 0.0, 9.0)) == 12

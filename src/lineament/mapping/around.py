@@ -168,7 +168,9 @@ class Around:
         """Return the poses that may be the right one, shape (n, 3); the last one is the motion."""
         walls = as_walls(sought.features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), sought.beams)
-        tried = self._tried(sought, query)
+        votes = voted(query.anchors, query, self.plan)
+        is_near = squares_off(votes, sought.prior, sought.spread) < _FARTHEST**2
+        tried = np.concatenate((grid_around(sought.prior, sought.spread), votes[is_near]))
         for count, most in _SIFTED:
             tried = tried[distinct(tried, self._nats(sought, tried, _WIDE, count), _APART, most)]
         tried = np.concatenate((tried, [motion.pose]))
@@ -177,17 +179,6 @@ class Around:
         slid = _SLID[:, None] * math.sqrt(sought.spread[0, 0])
         along = [motion.pose + slid * np.append(u, 0.0) for u in open_ways(motion)]
         return np.concatenate((fine, *along, tried))
-
-    def _tried(self, sought: Sought, query: Query) -> Array:
-        """Poses around the expected one, and those for which walls vote, shape (n, 3)."""
-        way, turn = np.sqrt(np.diag(sought.spread)[1:]).tolist()
-        steps = np.arange(-_STEPS, _STEPS + 1.0)
-        by = min(max(way, 0.1), 0.3), min(max(way, 0.1), 0.3), min(max(turn / 2, 0.05), 0.1)
-        of_axes = [at + k * steps for at, k in zip(sought.prior, by, strict=True)]
-        grid = np.stack(np.meshgrid(*of_axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        votes = voted(query.anchors, query, self.plan)
-        is_near = squares_off(votes, sought.prior, sought.spread) < _FARTHEST**2
-        return np.concatenate((grid, votes[is_near]))
 
     def _best(self, sought: Sought, motion: Motion, pose: Array) -> Motion:
         """Return the motion by what is matched near a pose, or that pose, if it is likelier."""
@@ -201,6 +192,15 @@ class Around:
         both = np.array([motion.pose, best.pose])
         matched, found = self._nats(sought, both, _FINAL) + self._agreed(sought, both)
         return best if found > matched + 1.0 else motion
+
+
+def grid_around(prior: Pose, spread: Array) -> Array:
+    """Return poses around the expected one, shape (n, 3), by steps of its deviations."""
+    way, turn = np.sqrt(np.diag(spread)[1:]).tolist()
+    steps, by = np.arange(-_STEPS, _STEPS + 1.0), min(max(way, 0.1), 0.3)
+    sizes = by, by, min(max(turn / 2, 0.05), 0.1)
+    of_axes = [at + size * steps for at, size in zip(prior, sizes, strict=True)]
+    return np.stack(np.meshgrid(*of_axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def open_ways(motion: Motion) -> Array:

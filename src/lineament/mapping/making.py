@@ -16,7 +16,8 @@ from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
 from ..walls.sights import errors, lines_of, merged, on_lines, sights_of
 from .adjust import Adjusted, edges_of, optimise
 from .believed import believed
-from .drive_map import UNKNOWN, KeyFrame
+from .chain import TWICE, found_back, spread_of
+from .drive_map import KeyFrame
 from .gone import standing
 from .grids import GRID_ENDINGS
 from .index import MAPPED
@@ -29,9 +30,6 @@ from .parts import Parts, apart, parts_of
 _ROUGH = 0.01
 #: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
 _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
-#: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
-#: nothing of motions below these deviations [m, m, rad].
-TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
 #: Surfaces that are so much off a common line are one wall [m].
 APART = 0.015
 #: A wall was seen by so many key frames.
@@ -129,6 +127,7 @@ def make_map(
     Key frames and scans are those of `Drive`. ``track(items, name, whole)`` yields what is looked
     at and shows the progress. NothingFoundError if there are no walls.
     """
+    frames = found_back(frames)
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
@@ -176,20 +175,6 @@ def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
     if not any(map(len, walls)):
         raise NothingFoundError(f"no wall is seen by {least} of {len(survey.frames)} key frames")
     return walls
-
-
-def spread_of(frame: KeyFrame) -> Array:
-    """Return the covariance of the motion to a key frame, of which walls say nothing twice.
-
-    What was expected before counts whole: odometry, or that the motion goes on. In a direction that
-    no wall shows nothing else holds the pose.
-    """
-    if frame.is_torn:
-        return UNKNOWN
-    if frame.is_contradicted or frame.is_lost:
-        return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
-    known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(frame.expected)
-    return np.asarray(np.linalg.inv(known) + _LEAST)
 
 
 def widened(segments: Records) -> Records:

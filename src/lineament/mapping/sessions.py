@@ -22,11 +22,12 @@ from ..walls import (
 )
 from ..walls.sights import joined, on_lines, sights_of, stretches
 from .adjust import Adjusted, edges_of, optimise
+from .chain import TWICE
 from .gone import along_lines, keys_of, looked_through, pieces_of, standing
 from .index import MAPPED
 from .line_map import LineMap
 from .loops import FLOOR, Survey
-from .making import APART, TWICE, VIEWS, DriveMap, single
+from .making import APART, VIEWS, DriveMap, single
 from .parts import beside, boxes_of
 from .placing import FEWEST, PLACES, Placement, is_enough, surely_on
 
