@@ -293,6 +293,7 @@ def main() -> None:
     parser.add_argument("--log", choices=LOGS, help="this log alone")
     parser.add_argument("--odometry", action="store_true", help="the poses of the log are it")
     parser.add_argument("--backwards", action="store_true", help="the last scan comes first")
+    parser.add_argument("--first", type=int, default=0, help="leave out so many scans before")
     parser.add_argument("--every", type=int, default=1, help="every so many scans alone")
     parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
     parser.add_argument("--floors", type=int, nargs="+", help="seeds of floors, each two one log")
@@ -310,7 +311,7 @@ def main() -> None:
     for name, (path, relations) in LOGS.items():
         if chosen.log not in (None, name) or not (DATA / path).exists():
             continue
-        scans = list(open_log(DATA / path))[:: chosen.every]
+        scans = list(open_log(DATA / path))[chosen.first :: chosen.every]
         if chosen.backwards:
             scans, relations = backwards(scans), None
         stamps = np.array([scan.stamp for scan in scans])

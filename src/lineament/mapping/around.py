@@ -48,7 +48,7 @@ _LOST = 0.38
 #: With less than this share of the ends that agree, of those that this scan and the last key frame
 #: can both see, it is lost too; if all agree, that says so much of a pose [nats], beside the walls.
 _AGREE, _LAST = 0.75, 60.0
-#: Another place is so far away [m, rad]; the way is lost if one is 55 times less likely, or more.
+#: Another place is so far away [m, rad]; the way is lost if one is less than 4 nats less likely.
 _OTHER, _DOUBT = 0.3, 4.0
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2

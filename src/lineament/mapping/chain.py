@@ -21,8 +21,8 @@ _BESIDE, _SAME = 6, (0.3, 0.3)
 def spread_of(frame: KeyFrame) -> Array:
     """Return the covariance of the motion to a key frame, of which walls say nothing twice.
 
-    What was expected before counts whole: odometry, or that the motion goes on. In a direction that
-    no wall shows nothing else holds the pose.
+    What was expected before counts whole: odometry, that the motion goes on, or where beams find
+    it. In a direction that no wall shows nothing else holds the pose.
     """
     if frame.is_torn:
         return UNKNOWN
@@ -63,14 +63,15 @@ def _found(frames: list[KeyFrame], k: int) -> KeyFrame:
     for back, frame in zip(steps[1:], frames[k - 1 : first : -1], strict=True):
         if not _is_same(back.motion.pose, inverse(frame.motion.pose)):
             return frames[k]
-    back, round_ = steps[0], _turned_round(steps[0].motion)
-    expected = round_ @ spread_of(back) @ round_.T
-    x, y, theta = inverse(back.motion.pose)
+    derivative = _turned_round(steps[0].motion)
+    expected = derivative @ spread_of(steps[0]) @ derivative.T
+    x, y, theta = inverse(steps[0].motion.pose)
     motion = Motion(x, y, theta, expected)
     return replace(frames[k], motion=motion, expected=expected, has_odometry=True)
 
 
 def _is_same(one: Pose, other: Pose) -> bool:
+    """Whether two steps are the same to the errors above."""
     x, y, theta = relative(one, other)
     return math.hypot(x, y) < _SAME[0] and abs(theta) < _SAME[1]
 
