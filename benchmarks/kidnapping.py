@@ -196,10 +196,10 @@ def agreements(name: str) -> str:
     rng, right, elsewhere = np.random.default_rng(5), [], []
     for before, scan in pairwise(scans):
         if math.dist(before.pose[:2], scan.pose[:2]) < FAR:
-            right.append(agreement(before, scan, relative(before.pose, scan.pose)))
+            right.append(agreement(before, scan, [relative(before.pose, scan.pose)])[0])
         other = scans[int(rng.integers(len(scans)))]
         if math.dist(before.pose[:2], other.pose[:2]) > FAR:
-            elsewhere.append(agreement(before, other, (0.05, 0.0, 0.02)))
+            elsewhere.append(agreement(before, other, [(0.05, 0.0, 0.02)])[0])
     shares = *np.nanquantile(right, (0.01, 0.5)), *np.nanquantile(elsewhere, (0.5, 0.99))
     return f"| {name} | {len(right)} | " + " | ".join(f"{share:.2f}" for share in shares) + " |"
 

@@ -129,7 +129,7 @@ class Around:
         motion = self._best(sought, motion, poses[nats.argmax()])
         evidence = self._evidence(motion, sought)
         is_lost = evidence[1] - _PASSED * evidence[3] < _LOST or evidence[0] < 0 or is_doubted
-        is_lost |= agreement(self.scan, scan, motion.pose) < _AGREE
+        is_lost |= agreement(self.scan, scan, [motion.pose])[0] < _AGREE
         return Found(motion, None if motion.observable else by_beams, bool(is_lost), evidence)
 
     def _match(self, features: Features, prior: Pose, spread: Array) -> Motion:
@@ -161,7 +161,7 @@ class Around:
 
     def _agreed(self, sought: Sought, poses: Array) -> Array:
         """Return what the last key frame says of poses [nats]; if it says nothing, a little."""
-        shares = [agreement(self.scan, sought.scan, (x, y, t)) for x, y, t in poses.tolist()]
+        shares = agreement(self.scan, sought.scan, poses.tolist())
         return _LAST * np.nan_to_num(shares, nan=LEAST)
 
     def _searched(self, sought: Sought, motion: Motion) -> Array:
