@@ -26,7 +26,7 @@ from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.evidence import OF_MAPS, RIGHT_ON_MAP, WRONG_ON_MAP, evidence_of
 from lineament.mapping.locate import _TIGHT as TIGHT
-from lineament.mapping.locate import _tried
+from lineament.mapping.locate import voted
 from lineament.mapping.making import make_map
 from lineament.scan import Pose
 from lineament.scan.poses import compose, relative
@@ -164,7 +164,7 @@ def elsewhere(place: Place, on: Mapped) -> tuple[np.ndarray, np.ndarray]:
     """Return the shares of the beams where the log puts a place, and at poses tried elsewhere."""
     k = nearest(on.logged, place.pose)
     here = compose(on.poses[k], relative(on.logged[k], place.pose))
-    poses = _tried(place.query.anchors, place.query, on.plan)
+    poses = voted(place.query.anchors, place.query, on.plan)
     far = poses[np.hypot(*(poses[:, :2] - here[:2]).T) > ELSEWHERE]
     return tuple(
         evidence_of(of, place.query.beams, on.plan.index, TIGHT)[:, 1:].mean(axis=0)

@@ -36,6 +36,16 @@ def test_tables_are_of_the_code_that_is_here():
     assert found[1] == results.source_hash(), "what is measured changed: run `make results`"
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
+def test_benchmarks_import_what_is_there(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lineament"):
+            module = importlib.import_module(node.module)
+            for name in (alias.name for alias in node.names):
+                if not hasattr(module, name):
+                    importlib.import_module(f"{node.module}.{name}")
+
+
 def test_every_table_has_its_place_and_is_filled():
     texts = [path.read_text(encoding="utf-8") for path in results.DOCUMENTS]
     for name in (*results.TABLES, "stamp"):
