@@ -19,7 +19,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from lineament_lab.evaluation.icp import icp
-from lineament_lab.evaluation.maps import absolute_errors, doubled_walls
+from lineament_lab.evaluation.maps import absolute_errors, contradicted, doubled_walls
 from lineament_lab.evaluation.relations import Relations, read_relations
 from matplotlib.collections import LineCollection
 
@@ -120,6 +120,24 @@ def by_part(made, truth):
         yield f"{way:.0f} m, ATE {found.summary()['way_rmse']:.3f} m, claimed {known:.3f} m"
 
 
+def seen_again(found, made, truth):
+    """Pairs of key frames of one part that look at a place again, and how many contradict there.
+
+    By the poses of the map, and by the corrected ones.
+    """
+    part, pairs = made.parts.numbers, []
+    for k in range(made.parts.count):
+        frames = [found.frames[i] for i in np.flatnonzero(part == k)]
+        poses = [[of[frame.index] for frame in frames] for of in (made.poses, truth)]
+        pairs.append(contradicted([frame.scan for frame in frames], *poses))
+    count = sum(n for n, _ in pairs)
+    ours, reference = sum(n * np.nan_to_num(shares) for n, shares in pairs) / max(count, 1)
+    return (
+        f"{count} pairs of scans look at a place again, {100 * ours:.1f} % contradict each other "
+        f"({100 * reference:.1f} % at the corrected poses)"
+    )
+
+
 def judged(name, about, poses, truth, relations, doubled=None, parts=1):
     cells = [name, about]
     if relations is None or parts > 1:  # parts lie beside each other
@@ -159,7 +177,8 @@ def rows(name, scans, truth, relations, odometry=False):
         f"{len(made.loops)} loops, {len(made.refused)} refused; played in {played:.0f} s; "
         f"{used:.1f} s of processor: {played / used:.1f} x; "
         f"{seconds:.1f} s by the clock: {played / seconds:.1f} x; not sure on "
-        f"{sum(way for *_, way in made.unsure):.1f} m; parts: {'; '.join(by_part(made, truth))} -->"
+        f"{sum(way for *_, way in made.unsure):.1f} m; parts: {'; '.join(by_part(made, truth))}; "
+        f"{seen_again(found, made, truth)} -->"
     )
     return found, made
 

@@ -4,9 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from lineament_lab.evaluation.maps import absolute_errors, alignment, doubled_walls
+from lineament_lab.evaluation.maps import (
+    absolute_errors,
+    alignment,
+    contradicted,
+    doubled_walls,
+)
 
 from lineament.scan.poses import compose
+from lineament.simulation import SENSORS, room
 
 
 def test_ways_are_aligned_before_they_are_compared():
@@ -62,3 +68,21 @@ def test_doubled_walls_by_hand(walls, length):
             for px, py in (wall[:2], wall[2:])
         ]
         assert doubled_walls(np.array(moved).reshape(-1, 4)) == pytest.approx(length, abs=1e-9)
+
+
+def test_scans_that_look_at_a_place_again_contradict_each_other_at_wrong_poses():
+    """There and back: by the true poses none of five pairs does, by others all that turned."""
+    rng, places = np.random.default_rng(4), np.linspace(-1.5, 1.5, 5)
+    out = [(x, -0.3, 0.2) for x in places.tolist()]
+    away = [(1.5, 9.0, 0.0), (-1.5, 9.0, 0.0)]
+    truth = [*out, *away, *[(x, 0.3, 0.2) for x in places.tolist()]]
+    scans = [SENSORS["utm30lx"].scan(room(), pose, rng) for pose in truth]
+    turned = [(x, y, theta + (0.5 if k > 8 else 0.0)) for k, (x, y, theta) in enumerate(truth)]
+    count, shares = contradicted(scans, truth, turned)
+    # Places are 0.75 m apart, ways 0.6 m: each is near the one on the way back, and its neighbours.
+    assert count == 5 + 8
+    assert shares[0] == 0
+    assert shares[1] == pytest.approx(
+        sum(abs(i - j) < 2 and j > 1 for i in range(5) for j in range(5)) / 13
+    )
+    assert contradicted(scans[:5], truth[:5])[0] == 0  # never again

@@ -8,7 +8,7 @@ import pytest
 
 import lineament as ln
 from lineament.mapping import LineMap
-from lineament.mapping.consistency import is_consistent
+from lineament.mapping.consistency import agreement, is_consistent
 from lineament.mapping.following import Follower
 from lineament.scan import LaserScan
 from lineament.scan.poses import compose, inverse, relative
@@ -62,7 +62,7 @@ def test_turns_are_followed_across_the_ends_of_the_circle(turn):
 
 
 def naive(before, scan, motion):
-    """Return the shares by one beam after the other."""
+    """Count the ends that are explained and contradicted, one beam after the other."""
     near = 0.08 + 0.1 * math.dist(motion[:2], (0, 0))
     turned = 0.015 + 0.1 * abs(math.remainder(motion[2], math.tau))
     explained = contradicted = 0
@@ -81,7 +81,7 @@ def naive(before, scan, motion):
             far = math.hypot(x, y)
             explained += min(beside) - near < far < max(beside) + near
             contradicted += far <= min(beside) - near
-    return explained + contradicted < 20 or explained >= 0.85 * (explained + contradicted)
+    return explained, contradicted
 
 
 def test_it_counts_as_a_loop_over_beams_does():
@@ -97,7 +97,12 @@ def test_it_counts_as_a_loop_over_beams_does():
             np.where(rng.random(n) < 0.9, ranges + noise, 0.5), -2.5, before.angle_increment
         )
         found.append(is_consistent(before, after, motion))
-        assert found[-1] == naive(before, after, motion)
+        explained, contradicted = naive(before, after, motion)
+        share = (
+            explained / (explained + contradicted) if explained + contradicted > 19 else math.nan
+        )
+        np.testing.assert_allclose(agreement(before, after, [motion]), [share], rtol=1e-12)
+        assert found[-1] == (not share < 0.85)
         assert found[-1] == is_consistent(after, before, inverse(motion))
     assert 30 < sum(found) < 120
 

@@ -161,7 +161,7 @@ class Around:
 
     def _agreed(self, sought: Sought, poses: Array) -> Array:
         """Return what the last key frame says of poses [nats]; if it says nothing, a little."""
-        shares = agreement(self.scan, sought.scan, poses.tolist())
+        shares = agreement(self.scan, sought.scan, poses)
         return _LAST * np.nan_to_num(shares, nan=LEAST)
 
     def _searched(self, sought: Sought, motion: Motion) -> Array:

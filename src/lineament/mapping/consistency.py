@@ -1,12 +1,12 @@
 """Whether a scan goes on where the last one was: neither looks through what the other has seen."""
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..kernels.mapping.agreeing import agree
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import inverse
 from ..walls import unit
 from .local_map import some
 
@@ -25,26 +25,19 @@ def is_consistent(before: LaserScan, scan: LaserScan, motion: Pose) -> bool:
     return not agreement(before, scan, [motion])[0] < LEAST
 
 
-def agreement(before: LaserScan, scan: LaserScan, motions: Iterable[Pose]) -> Array:
-    """Return the share of explained ends among those that both scans can see, of each motion.
+def agreement(before: LaserScan, scan: LaserScan, motions: ArrayLike) -> Array:
+    """Return the share of explained ends among those that both scans can see, of motions (n, 3).
 
     The ends of the beams of each are seen from where the other was taken. One that is there where
     beams of that scan end is explained; one that is nearer is contradicted, as those beams went
     through it; one that is farther away is hidden, and says nothing. NaN if they are few.
     """
-    old, new = _by_bearing(before), _by_bearing(scan)
-    ends_then, ends_now = some(old, _MOST), some(new, _MOST)
-    seen_then, seen_now = _going_round(old), _going_round(new)
-    shares = []
-    for motion in motions:
-        way, turn = math.hypot(motion[0], motion[1]), abs(math.remainder(motion[2], 2 * math.pi))
-        near, turned = _NEAR + _GROWTH * way, _TURNED + _GROWTH * turn
-        then = _count(_ends(ends_now, motion), seen_then, near, turned)
-        now = _count(_ends(ends_then, inverse(motion)), seen_now, near, turned)
-        explained, contradicted = then[0] + now[0], then[1] + now[1]
-        seen = explained + contradicted
-        shares.append(explained / seen if seen >= _FEWEST else math.nan)
-    return np.array(shares)
+    old, new, of = _by_bearing(before), _by_bearing(scan), np.array(motions, float).reshape(-1, 3)
+    ends = [beams[:, :1] * unit(beams[:, 1]) for beams in (some(old, _MOST), some(new, _MOST))]
+    counts = np.empty((len(of), 2))
+    agree(*ends, _going_round(old), _going_round(new), of, (_NEAR, _TURNED, _GROWTH), counts)
+    seen = counts.sum(axis=1)
+    return np.where(seen >= _FEWEST, counts[:, 0] / np.maximum(seen, 1.0), np.nan)
 
 
 def _by_bearing(scan: LaserScan) -> Array:
@@ -54,28 +47,7 @@ def _by_bearing(scan: LaserScan) -> Array:
     return np.asarray(beams[np.argsort(beams[:, 1])], np.float64)
 
 
-def _ends(beams: Array, pose: Pose) -> tuple[Array, Array]:
-    """Return range and bearing of the ends of beams of another pose, as they are seen from 0."""
-    x, y = beams[:, 0] * unit(beams[:, 1] + pose[2]).T + np.array(pose[:2])[:, None]
-    return np.hypot(x, y), np.arctan2(y, x) % (2 * math.pi)
-
-
-def _going_round(beams: Array) -> tuple[Array, Array]:
-    """Return bearings and ranges of beams, each also a turn before and after itself."""
-    bearings = np.concatenate([beams[:, 1] + turn for turn in (-2 * math.pi, 0.0, 2 * math.pi)])
-    return bearings, np.append(np.tile(beams[:, 0], 3), math.inf)
-
-
-def _count(
-    ends: tuple[Array, Array], seen: tuple[Array, Array], near: float, turned: float
-) -> tuple[int, int]:
-    """Count the ends that beams explain, and those that they contradict."""
-    bearings, ranges = seen
-    beside = np.searchsorted(bearings, [ends[1] - turned, ends[1] + turned])
-    is_seen = beside[0] < beside[1]
-    if not is_seen.any():
-        return 0, 0
-    far, runs = ends[0][is_seen], beside[:, is_seen].T.ravel()
-    least, most = (of.reduceat(ranges, runs)[::2] for of in (np.minimum, np.maximum))
-    is_explained = (far > least - near) & (far < most + near)
-    return int(is_explained.sum()), int((far <= least - near).sum())
+def _going_round(beams: Array) -> Array:
+    """Return beams, each also a turn before and after itself."""
+    turns = np.repeat((-2 * math.pi, 0.0, 2 * math.pi), len(beams))
+    return np.tile(beams, (3, 1)) + np.column_stack((np.zeros_like(turns), turns))

@@ -209,7 +209,8 @@ class Drive(InTurn):
         seen = seen[~np.isin(seen["wall"], [*self._gone])]
         self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
         poses = np.array([relative(last.pose, frame.pose) for frame in frames])
-        views = views_of(poses, self._far[-len(frames) :])
+        # The last one first: most places that were seen, it has seen.
+        views = views_of(poses[::-1], self._far[-len(frames) :][::-1])
         lines = lines_of(seen, poses, len(self._numbers))
         segments = segments_of(walls_along(seen, poses, lines, WHOLE))
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])

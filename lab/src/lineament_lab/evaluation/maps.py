@@ -1,4 +1,4 @@
-"""How good a map is: its poses against true ones, and walls that it has twice.
+"""How good a map is: its poses against true ones, walls that it has twice, scans that contradict.
 
 Relations are nearly blind to a map that is broken (see `relations`): these are not.
 """
@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lineament.scan import Array, Pose
+from lineament.mapping.consistency import LEAST, agreement
+from lineament.scan import Array, LaserScan, Pose
 from lineament.scan.poses import compose, relative
 
 from .tracking import MotionErrors
@@ -18,6 +19,9 @@ from .tracking import MotionErrors
 _PARALLEL = math.radians(10.0)
 #: Farthest doubled walls are apart [m].
 APART = 0.15
+#: Scans so near each other look at the same place; again, if so much way lies between them [m]. So
+#: many pairs are looked at, at most.
+_NEAR, _AGAIN, _PAIRS = 1.0, 10.0, 3000
 
 
 def alignment(poses: Sequence[Pose], truth: Sequence[Pose]) -> Pose:
@@ -90,6 +94,51 @@ def doubled_walls(walls: ArrayLike, apart: float = APART) -> float:
         beside = (along[:k] @ along[k] > math.cos(_PARALLEL)) & (off <= apart) & (high > low)
         total += _covered(np.column_stack((low, high))[beside])
     return total
+
+
+def contradicted(
+    scans: Sequence[LaserScan], poses: Sequence[Pose], *others: Sequence[Pose]
+) -> tuple[int, Array]:
+    """Return how many pairs of scans look at a place again, and the share that contradicts there.
+
+    That needs no true poses: scans from the same place look through nothing that the other has
+    seen, wherever that place is. A pair is within 1 m by any of the poses, with 10 m of way in
+    between by the first. It contradicts if less than 85 % of the ends that both can see are
+    explained. There is one share for each of the poses, of the same pairs; people and doors take
+    some of them also at true poses.
+
+    Examples
+    --------
+    A robot leaves a room, and is back; its poses turn by 90° on the way:
+
+    >>> import numpy as np
+    >>> from lineament.simulation import SENSORS, room
+    >>> true = [(-1.0, 0.0, 0.0), (1.0, 8.0, 0.0), (-1.0, 0.1, 0.0)]
+    >>> rng = np.random.default_rng(1)
+    >>> scans = [SENSORS["ld19"].scan(room(), pose, rng) for pose in true]
+    >>> count, shares = contradicted(scans, true, [*true[:2], (-1.0, 0.1, 1.6)])
+    >>> count, shares.tolist()
+    (1, [0.0, 1.0])
+    """
+    from scipy.spatial import cKDTree
+
+    ways = [np.asarray(of, dtype=np.float64) for of in (poses, *others)]
+    steps = np.hypot(*np.diff(ways[0][:, :2], axis=0, prepend=ways[0][:1, :2]).T)
+    near = [cKDTree(of[:, :2]).query_pairs(_NEAR, output_type="ndarray") for of in ways]
+    pairs = np.unique(np.concatenate(near), axis=0)
+    pairs = pairs[abs(np.diff(steps.cumsum()[pairs], axis=1)[:, 0]) > _AGAIN]
+    pairs = pairs[:: len(pairs) // _PAIRS + 1]
+    found = [
+        agreement(
+            scans[a],
+            scans[b],
+            [relative(tuple(of[a].tolist()), tuple(of[b].tolist())) for of in ways],
+        )
+        for a, b in pairs.tolist()
+    ]
+    shares = np.array(found).reshape(-1, len(ways))
+    shares = shares[np.isfinite(shares).all(axis=1)]
+    return len(shares), (shares < LEAST).mean(axis=0) if len(shares) else np.full(len(ways), np.nan)
 
 
 def _covered(intervals: Array) -> float:
