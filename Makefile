@@ -68,7 +68,8 @@ slow: library browser ros1
 
 # Of all lines by the quick tests; of the kernels', as plain Python, by these.
 OF_KERNELS := $(addprefix tests/test_,$(addsuffix .py,twins budget line_rules liu pdbs polylines \
-	optimal_partition optimal_scenes methods tracking tracking_motion mapping_parts locating_parts))
+	optimal_partition optimal_scenes methods tracking tracking_motion mapping_parts locating_parts \
+	scan_consistency))
 coverage: library
 	rm -f .coverage .coverage.*
 	$(BIN)/coverage run -m $(PYTEST) -m 'not slow'

@@ -35,6 +35,7 @@ def found(scans: int) -> dict[str, str]:
     from lineament.features import TABLES, noise_row
     from lineament.kernels import by_numba
     from lineament.mapping import LineMap, LocalMap, locate
+    from lineament.mapping.drive_map import Drive
     from lineament.simulation import SENSORS, drive
     from lineament.simulation.buildings import office
 
@@ -46,7 +47,7 @@ def found(scans: int) -> dict[str, str]:
         tables = [features[name] for name in TABLES]
         of_noise = noise_row(features.noise)
         hashes[f"seed {seed}, {method}"] = hashed(*tables, features.clusters, of_noise)
-    extract, tracker, local = ln.Extractor(), ln.Tracker(), LocalMap()
+    extract, tracker, local, driven = ln.Extractor(), ln.Tracker(), LocalMap(), Drive()
     storey = office(3, (24.0, 16.0))
     plan = LineMap.from_lines(storey.plan.segments, side=1)
     for k, scan in enumerate(
@@ -56,6 +57,8 @@ def found(scans: int) -> dict[str, str]:
         tracks = tracker(features)
         motion = (tracks.motion.covariance,) if tracks.motion else ()
         hashes[f"frame {k}"] = hashed(tracks.segments, tracks.corners, *motion)
+        step = driven.add(scan, features)
+        hashes[f"step {k}"] = hashed(np.array(step.pose), step.covariance, step.evidence)
         local.add(features, tracks)
         if k % 15 == 14:
             place = locate(local, plan)
