@@ -37,7 +37,7 @@ def agreement(before: LaserScan, scan: LaserScan, motions: ArrayLike) -> Array:
     counts = np.empty((len(of), 2))
     agree(*ends, _going_round(old), _going_round(new), of, (_NEAR, _TURNED, _GROWTH), counts)
     seen = counts.sum(axis=1)
-    return np.where(seen >= _FEWEST, counts[:, 0] / np.maximum(seen, 1.0), np.nan)
+    return np.asarray(np.where(seen >= _FEWEST, counts[:, 0] / np.maximum(seen, 1.0), np.nan))
 
 
 def _by_bearing(scan: LaserScan) -> Array:
@@ -50,4 +50,4 @@ def _by_bearing(scan: LaserScan) -> Array:
 def _going_round(beams: Array) -> Array:
     """Return beams, each also a turn before and after itself."""
     turns = np.repeat((-2 * math.pi, 0.0, 2 * math.pi), len(beams))
-    return np.tile(beams, (3, 1)) + np.column_stack((np.zeros_like(turns), turns))
+    return np.asarray(np.tile(beams, (3, 1)) + np.column_stack((np.zeros_like(turns), turns)))
