@@ -260,11 +260,25 @@ def test_a_clock_that_is_set_back_takes_no_time(files, capsys):
         np.full(len(scans[0]), np.inf), scans[0].angle_min, scans[0].angle_increment
     )
     seen = [blind, blind, *scans[:3], *[blind] * 40]
-    stamps = [10.0, 4.0, 4.5, 3.0, *np.arange(3.1, 90.0, 0.1)]
+    stamps = [20.0, 14.0, 14.5, 3.0, *np.arange(3.1, 90.0, 0.1)]
     save_npz(files / "log.npz", [bare(scan, at) for scan, at in zip(seen, stamps, strict=False)])
     options = ["--map", str(files / "plan.dxf"), "-o", str(files / "poses.csv")]
     assert run(["locate", f"{files}/log.npz", *options]) == 0
     assert "located first in scan 3, after 0.5 s, lost once since" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_a_robot_is_followed_by_the_order_of_scans_whose_clock_goes_back(files, odometry):
+    """As clocks of real logs do, by tenths of a second: each scan is located as before."""
+    truth = [(-2 + 0.1 * k, 0.2, 0.3) for k in range(12)]
+    late = [0.5 * k - 0.7 * (k % 3 == 2) for k in range(12)]
+    rows = zip(ln.open_log(files / "log.npz"), late, truth, strict=True)
+    scans = [bare(scan, at).with_pose(pose) for scan, at, pose in rows]
+    found = followed(scans, plan_of(room()), odometry)
+    assert [where.verdict for where in found] == ["located"] * 12
+    assert found[2].location is None  # not looked for anew
+    off = [math.dist(where.pose[:2], at[:2]) for where, at in zip(found, truth, strict=True)]
+    assert max(off) < 0.02
 
 
 def test_a_picture_does_not_replace_the_image_of_the_grid(files, refused):

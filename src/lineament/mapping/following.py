@@ -188,7 +188,7 @@ class Follower(InTurn):
             self._local.add(features, self._tracker(features, odometry))
         location = None
         is_due = self._since > STEP or self._turned > TURN
-        is_due |= features.stamp - self._looked > PERIOD
+        is_due |= abs(features.stamp - self._looked) > PERIOD
         if is_due or self._is_denied(evidence):
             location = self._look(blurred)
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
@@ -209,17 +209,20 @@ class Follower(InTurn):
         if not is_consistent(before, features.scan, motion.pose):
             self._restart()
             return self._tracker(features, odometry)
-        if odometry is None and duration == 0:
+        if odometry is None and duration <= 0:
             # Without a clock nothing says how far it went where no wall does.
             unknown = FASTEST**2 * motion.unobserved.T @ motion.unobserved
             motion = replace(motion, covariance=motion.covariance + unknown)
         return replace(tracks, motion=motion)
 
     def _is_torn(self, duration: float, odometry: Pose | None) -> bool:
-        """Whether the motion since the last scan is unknown."""
+        """Whether the motion since the last scan is unknown.
+
+        Clocks of real logs go back by tenths of a second: the order of the scans holds.
+        """
         if odometry is None or self._odometry is None:
-            return duration > GAP or duration < 0
-        return duration < 0 or math.dist(self._odometry[:2], odometry[:2]) > JUMP
+            return abs(duration) > GAP
+        return duration < -GAP or math.dist(self._odometry[:2], odometry[:2]) > JUMP
 
     def _move(self, motion: Pose, covariance: Array) -> None:
         """Go on by a motion."""
