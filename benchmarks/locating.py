@@ -1,4 +1,4 @@
-"""The tables of docs/locate.md: ``python benchmarks/locating.py --queries 20000 --seed 300``.
+"""The tables of docs/locate.md: ``python benchmarks/locating.py --queries 20000 --seed 700``.
 
 Simulated storeys with furniture and people that the plan does not have; a local map of up to 5 m
 of way is looked for on its plan, on that plan with walls moved by 0.3 m, mirrored, and on that of

@@ -1,6 +1,6 @@
 """Time of the default method by the number of beams, over scans that are hard to part.
 
-Run: python benchmarks/sizes.py. It prints the table of docs/optimal.md.
+Run: python benchmarks/sizes.py. Figures of docs/optimal.md.
 """
 
 import statistics
