@@ -299,6 +299,19 @@ def test_a_map_with_too_many_walls_beside_each_other_is_not_called_a_plan(
     assert "plan" not in error
 
 
+@pytest.mark.parametrize("stood", [1, 200])
+def test_odometry_is_no_worse_after_standing(stood):
+    """In a bare corridor odometry alone shows how far: by its way, however many scans it took."""
+    world, rng = World([[-40, 1, 40, 1], [40, -1, -40, -1]]), np.random.default_rng(0)
+    extract, way = Extractor(), Drive()
+    for k, x in enumerate([0.0] * stood + [0.1, 0.2, 0.3, 0.4]):
+        scan = SENSORS["lms181"].scan(world, (x, 0.0, 0.0), rng).stamped(0, k * 25_000_000)
+        way.add(scan, extract(scan), (x, 0.0, 0.0))
+    _, frame = way.frames
+    assert not frame.is_lost
+    np.testing.assert_allclose(np.sqrt(np.diag(frame.expected)), (0.06, 0.06, 0.02), atol=0.011)
+
+
 def test_one_scan_is_a_map():
     scan = next(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms361"]))
     placed = Drive()

@@ -11,7 +11,7 @@ from ..motion.association import associate
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..walls import as_walls, wrapped
-from .consistency import LEAST, agreement
+from .consistency import LEAST, agreement, is_consistent
 from .evidence import Says, evidence_of
 from .line_map import LineMap
 from .local_map import Query, beams_of, some
@@ -94,7 +94,7 @@ class Around:
         The walls of the last key frames, and the corners of the last one.
     scan : LaserScan
         The last key frame.
-    views : ndarray, shape (n, 364)
+    views : ndarray, shape (n, 372)
         From where the key frames have looked, and how far; see `views_of`.
     plan : LineMap
         The walls.
@@ -116,10 +116,12 @@ class Around:
         sought = Sought(scan, features, some(beams_of(features, scan), _BEAMS), prior, spread)
         motion = self._match(features, prior, spread)
         evidence = self._evidence(motion, sought)
-        sure = _SURE if math.sqrt(spread[0, 0]) < _NARROW else _SURER
-        if evidence[1] - evidence[3] >= sure and motion.observable:
+        is_narrow = math.sqrt(spread[0, 0]) < _NARROW
+        is_sure = evidence[1] - evidence[3] >= (_SURE if is_narrow else _SURER)
+        if is_sure and motion.observable:
             return Found(motion, None, False, evidence)
-        poses = self._searched(sought, motion)
+        is_along = is_sure and is_narrow and is_consistent(self.scan, scan, motion.pose)
+        poses = self._searched(sought, motion, is_along)
         nats = self._nats(sought, poses, _FINAL)
         # The motion that was matched is preferred by a little.
         nats[-1] += 0.5
@@ -164,21 +166,29 @@ class Around:
         shares = agreement(self.scan, sought.scan, poses)
         return _LAST * np.nan_to_num(shares, nan=LEAST)
 
-    def _searched(self, sought: Sought, motion: Motion) -> Array:
-        """Return the poses that may be the right one, shape (n, 3); the last one is the motion."""
-        walls = as_walls(sought.features.segments)
+    def _searched(self, sought: Sought, motion: Motion, is_along: bool) -> Array:
+        """Return the poses that may be the right one, shape (n, 3); the last one is the motion.
+
+        Where the walls say all but how far along them, only poses along them are tried.
+        """
+        walls, tried = as_walls(sought.features.segments), np.array([motion.pose])
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), sought.beams)
-        votes = voted(query.anchors, query, self.plan)
-        is_near = squares_off(votes, sought.prior, sought.spread) < _FARTHEST**2
-        tried = np.concatenate((grid_around(sought.prior, sought.spread), votes[is_near]))
-        for count, most in _SIFTED:
-            tried = tried[distinct(tried, self._nats(sought, tried, _WIDE, count), _APART, most)]
-        tried = np.concatenate((tried, [motion.pose]))
-        fine = refined(tried, query, self.plan.index, COARSE)[0]
-        fine = refined(fine, query, self.plan.index, FINE)[0]
         slid = _SLID[:, None] * math.sqrt(sought.spread[0, 0])
         along = [motion.pose + slid * np.append(u, 0.0) for u in open_ways(motion)]
-        return np.concatenate((fine, *along, tried))
+        if is_along:
+            along = [*along, tried]
+            return np.concatenate((self._refined(np.concatenate(along), query), *along))
+        votes = voted(query.anchors, query, self.plan)
+        is_near = squares_off(votes, sought.prior, sought.spread) < _FARTHEST**2
+        every = np.concatenate((grid_around(sought.prior, sought.spread), votes[is_near]))
+        for count, most in _SIFTED:
+            every = every[distinct(every, self._nats(sought, every, _WIDE, count), _APART, most)]
+        tried = np.concatenate((every, tried))
+        return np.concatenate((self._refined(tried, query), *along, tried))
+
+    def _refined(self, poses: Array, query: Query) -> Array:
+        near = refined(poses, query, self.plan.index, COARSE)[0]
+        return refined(near, query, self.plan.index, FINE)[0]
 
     def _best(self, sought: Sought, motion: Motion, pose: Array) -> Motion:
         """Return the motion by what is matched near a pose, or that pose, if it is likelier."""

@@ -37,13 +37,14 @@ def believed(survey: Survey) -> list[KeyFrame]:
     A robot in a lift, or one that is carried, moves while its wheels stand. Where the way is lost,
     nothing but odometry joins what was seen before and after. It is denied if a wrong pose is
     likelier than any near it (1000 : 1): beams of either side end on walls of the other, or pass
-    through them.
+    through them. It is, too, if the way to the lost key frame contradicts it: a scanner that is
+    covered seems to stand, and nobody knows for how long.
     """
     frames = list(survey.frames)
     for k, frame in enumerate(frames):
         if k and frame.is_lost and frame.has_odometry:
             torn = [*frames[:k], replace(frame, has_odometry=False), *frames[k + 1 :]]
-            if _odds(replace(survey, frames=torn), k) < -SURE:
+            if frame.is_contradicted or _odds(replace(survey, frames=torn), k) < -SURE:
                 frames = torn
     return frames
 

@@ -117,12 +117,13 @@ class Drive(InTurn):
         """Add the next scan; return where it was taken."""
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         has_odometry = odometry is not None and self._last[1] is not None
+        by = relative(self._from, odometry) if odometry and self._from and has_odometry else None
         if self.frames:
             prior, spread = self._expected(scan.stamp, odometry)
             motion, by_beams, is_lost, self._evidence = self._around.place(
                 scan, features, prior, spread
             )
-            self._spread = self._spread + spread
+            self._spread = self._spread + spread if by is None else _errors_of(by, *_ODOMETRY)
             if is_lost:
                 motion = Motion(*prior, spread)
             elif by_beams is not None and not has_odometry:
@@ -131,10 +132,8 @@ class Drive(InTurn):
             is_key = way >= SPACING or turn >= TURN or is_lost
             self._go_on(scan.stamp, motion.pose, spread, by_beams)
         if is_key:
-            off = np.zeros(3)
-            if has_odometry and self._from is not None and odometry is not None:
-                off = np.subtract(motion.pose, relative(self._from, odometry))
-                off[2] = wrapped(off[2])
+            off = np.zeros(3) if by is None else np.subtract(motion.pose, by)
+            off[2] = wrapped(off[2])
             self._key(features, motion, scan, (is_lost, has_odometry, off))
             self._spread, self._from = np.zeros((3, 3)), odometry
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
@@ -162,17 +161,11 @@ class Drive(InTurn):
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
         before, duration = self._last[2], stamp - self._last[0]
         if odometry is not None and self._last[1] is not None:
-            (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
             step = relative(self._last[1], odometry)
-        else:
-            by_way, by_turn = _CONTINUED
-            duration = max(duration, self._pace)
-            least_way = min(0.02 + 0.4 * duration, 0.3)
-            least_turn = min(0.02 + 0.8 * duration, 0.7)
-            step = self._step
-        way = least_way + by_way * math.hypot(step[0], step[1])
-        turned = least_turn + by_turn * abs(step[2])
-        return compose(before, step), np.diag((way, way, turned)) ** 2
+            return compose(before, step), _errors_of(step, *_ODOMETRY)
+        duration = max(duration, self._pace)
+        least = min(0.02 + 0.4 * duration, 0.3), min(0.02 + 0.8 * duration, 0.7)
+        return compose(before, self._step), _errors_of(self._step, least, _CONTINUED)
 
     def _key(
         self,
@@ -224,6 +217,13 @@ class Drive(InTurn):
             last.features, segments=segments, corners=corners, edges=edges, arcs=arcs
         )
         self._around = Around.of(features, last.scan, views)
+
+
+def _errors_of(motion: Pose, least: tuple[float, float], growth: tuple[float, float]) -> Array:
+    """Return the covariance of a motion whose deviations grow with its way and its turn."""
+    way = least[0] + growth[0] * math.hypot(motion[0], motion[1])
+    turn = least[1] + growth[1] * abs(motion[2])
+    return np.diag((way, way, turn)) ** 2
 
 
 def turned(covariance: Array, angle: float) -> Array:

@@ -9,8 +9,11 @@ from ..scan import Array, LaserScan
 
 #: Bearings of a view; each has the nearest of the beams in it and beside it.
 BEARINGS = 360
+#: Octants in the order in which the kernel numbers them: by whether a place is to the right, is
+#: behind, and is more beside than ahead or behind.
+_OCTANTS = [0, 1, 3, 2, 7, 6, 4, 5]
 #: Of a plan that is known all over.
-NO_VIEWS = np.empty((0, 4 + BEARINGS))
+NO_VIEWS = np.empty((0, 4 + BEARINGS + len(_OCTANTS)))
 
 
 def looked(scan: LaserScan) -> Array:
@@ -29,6 +32,9 @@ def looked(scan: LaserScan) -> Array:
 
 
 def views_of(poses: Array, far: Sequence[Array]) -> Array:
-    """Return the views from poses (n, 3) as the kernels take them."""
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.ascontiguousarray(np.column_stack((poses[:, :2], c, s, np.stack(far))))
+    """Return the views from poses (n, 3) as the kernels take them, shape (n, 372)."""
+    c, s, by = np.cos(poses[:, 2]), np.sin(poses[:, 2]), np.stack(far)
+    # Bearings beside an octant are of it, too: those at its border are rounded to either.
+    wide = np.max((by, np.roll(by, 1, axis=1), np.roll(by, -1, axis=1)), axis=0)
+    farthest = wide.reshape(len(by), len(_OCTANTS), -1).max(axis=2)[:, _OCTANTS]
+    return np.ascontiguousarray(np.column_stack((poses[:, :2], c, s, by, farthest)))

@@ -14,6 +14,8 @@ THROUGH = 16.0
 _LAPS = 8
 #: By so much of a cell, places along a beam are rounded, and far less.
 _ROUNDED = 1e-6
+#: Views end with how far they have looked in each octant.
+_OCTANTS = 8
 
 
 @helper
@@ -104,13 +106,16 @@ def _passes(walls, grid, begins, members, origin, end, direction, pose, shy, spr
 @helper
 def _was_seen(views, x, y, near):
     """Whether a place lies before the end of a beam of one of the views, or so near behind it."""
-    bearings = views.shape[1] - 4
+    bearings = views.shape[1] - 4 - _OCTANTS
     for k in range(len(views)):
         dx, dy, c, s = x - views[k, 0], y - views[k, 1], views[k, 2], views[k, 3]
-        turn = math.atan2(c * dy - s * dx, c * dx + s * dy) / (2.0 * math.pi)
-        at = 4 + int(turn % 1.0 * bearings) % bearings
-        if math.sqrt(dx * dx + dy * dy) < views[k, at] + near:
-            return True
+        ahead, left, far = c * dx + s * dy, c * dy - s * dx, math.sqrt(dx * dx + dy * dy)
+        # Most places are farther than all that the view has seen in their octant.
+        octant = 4 * (left < 0.0) + 2 * (ahead < 0.0) + (abs(left) > abs(ahead))
+        if far < views[k, 4 + bearings + octant] + near:
+            at = int(math.atan2(left, ahead) / (2.0 * math.pi) % 1.0 * bearings) % bearings
+            if far < views[k, 4 + at] + near:
+                return True
     return False
 
 
@@ -140,9 +145,10 @@ def judge(
     whether walls may be seen through: a beam that ends on a wall is then explained, whatever it has
     passed.
 
-    `views` are rows of x, y, cos and sin of a pose from which the plan was seen, and how far, by
-    bearing; without any, all was seen. A beam that ends where none has looked is of no weight: it
-    says nothing, unless it ends where one of `every` wall goes on, for the pose.
+    `views` are rows of x, y, cos and sin of a pose from which the plan was seen, how far, by
+    bearing, and by octant at most; without any, all was seen. A beam that ends where none has
+    looked is of no weight: it says nothing, unless it ends where one of `every` wall goes on, for
+    the pose.
     """
     explained, short, through, spread, margin, shy, best, apart, reach = settings
     most, count = max(explained, short, through), len(beams)
