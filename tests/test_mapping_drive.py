@@ -312,6 +312,20 @@ def test_odometry_is_no_worse_after_standing(stood):
     np.testing.assert_allclose(np.sqrt(np.diag(frame.expected)), (0.06, 0.06, 0.02), atol=0.011)
 
 
+def test_in_a_bare_corridor_a_robot_goes_on_by_more_than_its_last_two_scans():
+    """At 20 Hz a step is 2 cm, and a pose known to half of that where a door shows it."""
+    walls = [[-40, 1, 0, 1], [0, 1, 0, 1.5], [0, 1.5, 1, 1.5], [1, 1.5, 1, 1], [1, 1, 60, 1]]
+    world, rng = World([*walls, [60, -1, -40, -1]]), np.random.default_rng(2)
+    extract, way = Extractor(), Drive()
+    for k in range(400):
+        scan = SENSORS["lms181"].scan(world, (0.02 * k - 1.0, 0.0, 0.0), rng)
+        at = way.add(scan.stamped(0, k * 50_000_000), extract(scan)).pose
+        if k == 60:
+            seen = at[0]
+    assert seen == pytest.approx(60 * 0.02, abs=0.03)
+    assert at[0] - seen == pytest.approx(339 * 0.02, rel=0.02)
+
+
 def test_one_scan_is_a_map():
     scan = next(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms361"]))
     placed = Drive()

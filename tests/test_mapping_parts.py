@@ -151,12 +151,17 @@ def test_without_odometry_a_drive_goes_on_as_it_did():
     np.testing.assert_allclose(placed._expected(6.0, None)[1], spread, rtol=0.05)
 
 
-def test_a_step_is_believed_by_as_much_as_it_is_known_better_than_what_is_usual():
-    """Half of the deviation that is expected is usual; beams know the step as well."""
-    placed = going((0.05, 0.01, 0.0), 0.1)
-    usual = np.diag((0.1, 0.1, 0.2)) ** 2
-    placed._go_on(6.1, (61 * 0.05 + 0.02, 61 * 0.01, 0.04), 4.0 * usual, usual)
-    np.testing.assert_allclose(placed._step, (0.06, 0.01, 0.02), atol=1e-9)
+@pytest.mark.parametrize(("pace", "share"), [(0.1, 0.2), (1.0, 1.0), (2.0, 1.0)])
+def test_a_step_is_believed_by_as_much_as_it_is_known_better_than_what_is_usual(pace, share):
+    """Half of the deviation that is expected is usual; beams know the step as well.
+
+    What goes on is the step of the last half second.
+    """
+    placed = going((0.05, 0.01, 0.0), pace)
+    usual, now = np.diag((0.1, 0.1, 0.2)) ** 2, 61 * pace
+    placed._go_on(now, (61 * 0.05 + 0.02, 61 * 0.01, 0.04), 4.0 * usual, usual)
+    believed = 0.05 + share * 0.01, 0.01, share * 0.02
+    np.testing.assert_allclose(placed._step, believed, atol=3e-4)
 
 
 def test_a_robot_is_not_thought_to_go_on_faster_than_1_2_metres_a_second():

@@ -20,7 +20,7 @@ SETTINGS = {
                "_NEAR": np.diag((0.05, 0.05, 0.02)) ** 2},
     "chain": {"TWICE": 25.0, "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_BESIDE": 6,
               "_SAME": (0.3, 0.3)},
-    "drive_map": {"REMEMBERED": 30, "_SLOWEST": 3.0, "_CONTRADICTED": 5.0,
+    "drive_map": {"REMEMBERED": 30, "_SLOWEST": 3.0, "_LASTING": 0.5, "_CONTRADICTED": 5.0,
                   "UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2},
     "parts": {"_LEAST": 5.0},
     "evidence": {"RIGHT_ON_MAP": (0.84, 0.13, 0.03), "WRONG_ON_MAP": (0.19, 0.43, 0.38),

@@ -30,6 +30,8 @@ _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 _CONTINUED = (0.3, 0.3)
 #: A robot is not thought to go on faster [m/s, rad/s]; longest time from scan to scan [s].
 _FAST, _SLOWEST = 1.2, 3.0
+#: It goes on as it did for so long [s]: from one scan to the next, errors of both would count.
+_LASTING = 0.5
 #: Motions off what odometry says by so many deviations contradict it.
 _CONTRADICTED = 5.0
 #: Covariance of a motion of which nothing is known [m, m, rad].
@@ -145,15 +147,17 @@ class Drive(InTurn):
         return Step(here, turned(unsure, here[2] - motion.theta), self._evidence)
 
     def _go_on(self, stamp: float, pose: Pose, expected: Array, by_beams: Array | None) -> None:
-        """Remember the step, by as much as beams know better than what was expected."""
+        """Remember the step of the last half second, by as much as beams know it better."""
         duration = stamp - self._last[0]
         if duration > 0:
             self._pace += 0.1 * (min(duration, _SLOWEST) - self._pace)
-        most, step = _FAST * self._pace, np.array(relative(self._last[2], pose))
+        most, step = _FAST * self._pace, np.array(self._step)
+        off = relative(self._last[2], pose) - step
+        off[2] = wrapped(off[2])
         if by_beams is not None:
-            off, usual = step - self._step, USUAL**2 * expected
-            off[2] = wrapped(off[2])
-            step = self._step + usual @ np.linalg.inv(usual + by_beams) @ off
+            usual = USUAL**2 * expected
+            off = usual @ np.linalg.inv(usual + by_beams) @ off
+        step += min(self._pace / _LASTING, 1.0) * off
         x, y, turn = np.clip(step, -most, most).tolist()
         self._step = x, y, turn
 
