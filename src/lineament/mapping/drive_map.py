@@ -119,7 +119,7 @@ class Drive(InTurn):
         """Add the next scan; return where it was taken."""
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         has_odometry = odometry is not None and self._last[1] is not None
-        by = relative(self._from, odometry) if odometry and self._from and has_odometry else None
+        by = self._by(odometry) if has_odometry else None
         if self.frames:
             prior, spread = self._expected(scan.stamp, odometry)
             motion, by_beams, is_lost, self._evidence = self._around.place(
@@ -145,6 +145,12 @@ class Drive(InTurn):
         unsure = UNKNOWN if is_lost and not has_odometry else motion.covariance
         # The axes of the motion are those of the key frame before it.
         return Step(here, turned(unsure, here[2] - motion.theta), self._evidence)
+
+    def _by(self, odometry: Pose | None) -> Pose | None:
+        """Return the motion since the last key frame by odometry, if it is known."""
+        if odometry is None or self._from is None:
+            return None
+        return relative(self._from, odometry)
 
     def _go_on(self, stamp: float, pose: Pose, expected: Array, by_beams: Array | None) -> None:
         """Remember the step of the last half second, by as much as beams know it better."""
