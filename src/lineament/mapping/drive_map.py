@@ -30,7 +30,7 @@ _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 _CONTINUED = (0.3, 0.3)
 #: A robot is not thought to go on faster [m/s, rad/s]; longest time from scan to scan [s].
 _FAST, _SLOWEST = 1.2, 3.0
-#: It goes on as it did for so long [s]: from one scan to the next, errors of both would count.
+#: It is expected to go on as in so long [s]: by one step of a fast scanner it would be by noise.
 _LASTING = 0.5
 #: Motions off what odometry says by so many deviations contradict it.
 _CONTRADICTED = 5.0
@@ -119,7 +119,7 @@ class Drive(InTurn):
         """Add the next scan; return where it was taken."""
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         has_odometry = odometry is not None and self._last[1] is not None
-        by = self._by(odometry) if has_odometry else None
+        by = self._by_odometry(odometry) if has_odometry else None
         if self.frames:
             prior, spread = self._expected(scan.stamp, odometry)
             motion, by_beams, is_lost, self._evidence = self._around.place(
@@ -146,7 +146,7 @@ class Drive(InTurn):
         # The axes of the motion are those of the key frame before it.
         return Step(here, turned(unsure, here[2] - motion.theta), self._evidence)
 
-    def _by(self, odometry: Pose | None) -> Pose | None:
+    def _by_odometry(self, odometry: Pose | None) -> Pose | None:
         """Return the motion since the last key frame by odometry, if it is known."""
         if odometry is None or self._from is None:
             return None
