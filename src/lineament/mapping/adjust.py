@@ -117,14 +117,15 @@ def optimise(
     Sights beyond 3 deviations count less. Loops have a weight of k⁴ / (k² + e²)², with e² their
     square (Geman and McClure), which is 1 where they are right and 0 where they are wrong; k comes
     down to 3 from round to round, so that at first none is left out. Walls are eliminated (Schur),
-    so that the equations are of the poses alone.
+    so that the equations are of the poses alone. Without rounds, the poses stay: what is returned
+    is how they are known.
     """
     sights = np.zeros(0, SIGHT) if sights is None else sights
     state, n, lines = poses.copy(), len(poses), lines_of(sights, poses, count)
     information, (a, b) = np.linalg.inv(sights["covariance"]), edges["ends"].T
     w, frames, every, here = sights["wall"], sights["frame"], np.arange(count), np.atleast_1d(held)
     kernel = _KERNEL * (_WIDE if edges["loop"].any() else 1.0)
-    for _ in range(rounds + _WIDER * (kernel > _KERNEL)):
+    for _ in range(max(rounds, 1) + _WIDER * (kernel > _KERNEL)):
         off, of_pose, of_wall = errors(sights, state, lines)
         weighted = robust(off, information)
         by_pose = of_pose.transpose(0, 2, 1) @ weighted
@@ -145,6 +146,8 @@ def optimise(
         both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
         gain = both @ _matrix([(own, every, every)], count, count, dense)
         matrix = _matrix(blocks, n, n, dense) - gain @ both.T
+        if not rounds:
+            break
         step = _solver(matrix)(gain @ towards.ravel() - gradient.ravel())
         turn = (own @ (-towards - (both.T @ step).reshape(-1, 2))[:, :, None])[:, :, 0]
         state = state + step.reshape(-1, 3)

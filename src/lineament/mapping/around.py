@@ -38,8 +38,8 @@ _BEAMS, _SIFTED = 120, ((12, 150), (40, 32))
 _WIDE, _FINAL, _TIGHT = 0.12, 0.07, 0.04
 #: Poses that are tried are so far from each other [m, rad]; so many are chosen from.
 _APART, _CHOSEN = (0.15, 0.06), 12
-#: Poses along what no wall shows, in deviations.
-_SLID = np.linspace(-2.5, 2.5, 11)
+#: Poses along what no wall shows that are tried, in deviations; that judge how far it went [m].
+_SLID, _ALONG = np.linspace(-2.5, 2.5, 11), np.linspace(-2.5, 2.5, 51)
 #: What is expected is off by Student's distribution of 3 degrees of freedom, of this share of its
 #: deviations: most motions go on as they did, and some robots turn at once.
 USUAL, _FREEDOM = 0.5, 3.0
@@ -126,13 +126,28 @@ class Around:
         # The motion that was matched is preferred by a little.
         nats[-1] += 0.5
         few = np.append(distinct(poses[:-1], nats[:-1], _APART, _CHOSEN), len(poses) - 1)
-        poses, nats = poses[few], nats[few] + self._agreed(sought, poses[few])
+        poses, nats = poses[few], nats[few] + self._agreed(scan, poses[few])
         is_doubted, by_beams = doubts(poses, nats, motion)
         motion = self._best(sought, motion, poses[nats.argmax()])
         evidence = self._evidence(motion, sought)
         is_lost = evidence[1] - _PASSED * evidence[3] < _LOST or evidence[0] < 0 or is_doubted
         is_lost |= agreement(self.scan, scan, [motion.pose])[0] < _AGREE
         return Found(motion, None if motion.observable else by_beams, bool(is_lost), evidence)
+
+    def alone(self, scan: LaserScan, features: Features, motion: Motion) -> Array:
+        """Return the covariance that beams alone leave along what no wall shows.
+
+        Any pose less than 4 nats less likely than the best may be right: beams that say less say it
+        by chance, and those of the next scan say it again.
+        """
+        beams, spread = some(beams_of(features, scan), _BEAMS), _NEAR.copy()
+        for u in open_ways(motion):
+            poses = motion.pose + _ALONG[:, None] * np.append(u, 0.0)
+            judged = evidence_of(poses, beams, self.plan.index, _FINAL, _SAYS, views=self.views)
+            nats = judged[:, 0] + self._agreed(scan, poses)
+            shares = np.exp(np.minimum(nats - nats.max() + _DOUBT, 0.0))
+            spread[:2, :2] += shares @ _ALONG**2 / shares.sum() * np.outer(u, u)
+        return spread
 
     def _match(self, features: Features, prior: Pose, spread: Array) -> Motion:
         motion, matches = Motion(*prior, spread), None
@@ -161,9 +176,9 @@ class Around:
         )
         return np.asarray(found[:, 0])
 
-    def _agreed(self, sought: Sought, poses: Array) -> Array:
+    def _agreed(self, scan: LaserScan, poses: Array) -> Array:
         """Return what the last key frame says of poses [nats]; if it says nothing, a little."""
-        shares = agreement(self.scan, sought.scan, poses)
+        shares = agreement(self.scan, scan, poses)
         return _LAST * np.nan_to_num(shares, nan=LEAST)
 
     def _searched(self, sought: Sought, motion: Motion, is_along: bool) -> Array:
@@ -200,7 +215,7 @@ class Around:
             covariance = np.linalg.inv(walls_say + np.linalg.inv(sought.spread))
             motion = replace(motion, covariance=covariance)
         both = np.array([motion.pose, best.pose])
-        matched, found = self._nats(sought, both, _FINAL) + self._agreed(sought, both)
+        matched, found = self._nats(sought, both, _FINAL) + self._agreed(sought.scan, both)
         return best if found > matched + 1.0 else motion
 
 

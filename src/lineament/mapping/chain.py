@@ -8,11 +8,16 @@ import numpy as np
 from ..motion.estimate import Motion
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse, relative
+from ..walls import Records
+from .around import open_ways
 from .drive_map import REMEMBERED, UNKNOWN, Drive, KeyFrame
 
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
 TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
+#: The speed of a robot lasts so long [s]. It differs by as much as is seen, and for so long a time
+#: by what is usual [s, m/s].
+_LASTING, _FEW, _USUAL = 2.5, 10.0, 0.2
 #: So many key frames on either side are not lost, and those before are found where they were, to
 #: these errors of each step [m, rad].
 _BESIDE, _SAME = 6, (0.3, 0.3)
@@ -30,6 +35,52 @@ def spread_of(frame: KeyFrame) -> Array:
         return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
     known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(frame.expected)
     return np.asarray(np.linalg.inv(known) + _LEAST)
+
+
+def unseen(frames: list[KeyFrame]) -> Array:
+    """Return what is not known of the motion to each key frame that is bare, covariances (n, 3, 3).
+
+    Where neither walls nor odometry show how far the robot went, it is placed as if it went on as
+    it did. How far it may be off is known by how much the speed differs along this drive, an
+    Ornstein-Uhlenbeck process: of each motion, by what that adds to the variance of the way since
+    the speed was seen; or by beams, if they know it better.
+    """
+    found, since, deviation = np.zeros((len(frames), 3, 3)), 0.0, _deviation(frames)
+    for k, frame in enumerate(frames):
+        if frame.alone is None:
+            since = 0.0
+            continue
+        before, since = since, since + frame.duration
+        by_speed = deviation**2 * (_wandered(since) - _wandered(before))
+        for u in open_ways(frame.motion):
+            by_beams = float(u @ frame.alone[:2, :2] @ u)
+            found[k, :2, :2] += min(by_speed, by_beams) * np.outer(u, u)
+            since = since if by_speed < by_beams else 0.0
+    return found
+
+
+def loosened(chain: Records, unknown: Array) -> Records:
+    """Return motions between key frames that are known worse, by covariances of each key frame."""
+    loose, before = chain.copy(), np.linalg.inv(chain["information"])
+    is_next = np.diff(chain["ends"], axis=1)[:, 0] == 1
+    more = np.where(is_next[:, None, None], unknown[chain["ends"][:, 1]], 0.0)
+    loose["information"] = np.linalg.inv(before + more)
+    return loose
+
+
+def _deviation(frames: list[KeyFrame]) -> float:
+    """Return the deviation of the speed where it is seen, with a little of what is usual [m/s]."""
+    seen = [frame for frame in frames if frame.motion.observable and not frame.is_lost]
+    times = np.array([frame.duration for frame in seen])
+    off = np.array([frame.motion.x for frame in seen]) / np.maximum(times, 1e-9)
+    off -= times @ off / max(times.sum(), 1e-9)
+    return math.sqrt((times @ off**2 + _FEW * _USUAL**2) / (times.sum() + _FEW))
+
+
+def _wandered(time: float) -> float:
+    """Return the variance of the way after a time, of a unit deviation of the speed [s²]."""
+    t = time / _LASTING
+    return _LASTING**2 * (2 * t - 3 + 4 * math.exp(-t) - math.exp(-2 * t))
 
 
 def found_back(frames: list[KeyFrame]) -> list[KeyFrame]:

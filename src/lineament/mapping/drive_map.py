@@ -44,9 +44,10 @@ class KeyFrame:
 
     `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
     first key frame, `motion` that since the one before: a guess where the way is lost, unless it
-    `has_odometry`. `expected` is the covariance of the motion before walls are matched: by
-    odometry, by how it went on, or by beams where no wall shows how far. `off` is what walls say
-    beside what was expected since the key frame before [m, m, rad].
+    `has_odometry`, of so long a `duration` [s]. `expected` is its covariance before walls are
+    matched: by odometry, by how it went on, or by beams where no wall shows how far. There, without
+    odometry, `alone` is that by beams alone. `off` is what walls say beside what was expected since
+    the key frame before [m, m, rad].
     """
 
     index: int
@@ -55,7 +56,9 @@ class KeyFrame:
     walls: Numbers
     pose: Pose
     motion: Motion
+    duration: float
     expected: Array
+    alone: Array | None
     is_lost: bool
     has_odometry: bool
     off: Array
@@ -105,13 +108,13 @@ class Drive(InTurn):
         #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its step.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
         self._step: Pose = (0.0, 0.0, 0.0)
-        #: Covariance of the motion since the last key frame, before walls are matched.
-        self._spread = np.zeros((3, 3))
+        #: Time of the motion since the last key frame [s]; covariance, before walls are matched.
+        self._lasted, self._spread = 0.0, np.zeros((3, 3))
         #: What the last beams say.
         self._evidence = np.array((0.0, 1.0, 0.0, 0.0))
         #: Odometry at the last key frame.
         self._from: Pose | None = None
-        #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
+        #: Time from scan to scan, on average.
         self._pace = 1.0
 
     @in_turn
@@ -125,6 +128,7 @@ class Drive(InTurn):
             motion, by_beams, is_lost, self._evidence = self._around.place(
                 scan, features, prior, spread
             )
+            self._lasted += self._since(scan.stamp)
             self._spread = self._spread + spread if by is None else _errors_of(by, *_ODOMETRY)
             if is_lost:
                 motion = Motion(*prior, spread)
@@ -136,8 +140,10 @@ class Drive(InTurn):
         if is_key:
             off = np.zeros(3) if by is None else np.subtract(motion.pose, by)
             off[2] = wrapped(off[2])
-            self._key(features, motion, scan, (is_lost, has_odometry, off))
-            self._spread, self._from = np.zeros((3, 3)), odometry
+            is_bare = not (is_lost or has_odometry or motion.observable)
+            alone = self._around.alone(scan, features, motion) if is_bare else None
+            self._key(features, motion, scan, (alone, is_lost, has_odometry, off))
+            self._lasted, self._spread, self._from = 0.0, np.zeros((3, 3)), odometry
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
         self._last = scan.stamp, odometry, pose
@@ -167,13 +173,16 @@ class Drive(InTurn):
         x, y, turn = np.clip(step, -most, most).tolist()
         self._step = x, y, turn
 
+    def _since(self, stamp: float) -> float:
+        """Return the time since the last scan: stamps may come in bunches, or be all the same."""
+        return max(stamp - self._last[0], self._pace)
+
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
-        before, duration = self._last[2], stamp - self._last[0]
+        before, duration = self._last[2], self._since(stamp)
         if odometry is not None and self._last[1] is not None:
             step = relative(self._last[1], odometry)
             return compose(before, step), _errors_of(step, *_ODOMETRY)
-        duration = max(duration, self._pace)
         least = min(0.02 + 0.4 * duration, 0.3), min(0.02 + 0.8 * duration, 0.7)
         return compose(before, self._step), _errors_of(self._step, least, _CONTINUED)
 
@@ -182,12 +191,12 @@ class Drive(InTurn):
         features: Features,
         motion: Motion,
         scan: LaserScan,
-        found: tuple[bool, bool, Array],
+        found: tuple[Array | None, bool, bool, Array],
     ) -> None:
         """Take a key frame; its segments are walls that are known, or new ones."""
         here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
-        if found[0]:
+        if found[1]:
             self._first = len(self.frames)
         elif self.frames:
             around = self._around.features.transform(*inverse(motion.pose))
@@ -199,7 +208,7 @@ class Drive(InTurn):
         is_unknown = walls < 0
         walls[is_unknown] = self._next + np.arange(is_unknown.sum())
         self._next += int(is_unknown.sum())
-        at, known = len(self.scans), (motion, self._spread, *found)
+        at, known = len(self.scans), (motion, self._lasted, self._spread, *found)
         key = KeyFrame(at, scan, features, walls, here, *known)
         self.frames.append(key)
         self._far = [*self._far, looked(scan)][-REMEMBERED:]

@@ -16,7 +16,7 @@ from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
 from ..walls.sights import errors, lines_of, merged, on_lines, sights_of
 from .adjust import Adjusted, edges_of, optimise
 from .believed import believed
-from .chain import TWICE, found_back, spread_of
+from .chain import TWICE, found_back, loosened, spread_of, unseen
 from .drive_map import KeyFrame
 from .gone import standing
 from .grids import GRID_ENDINGS
@@ -141,12 +141,16 @@ def make_map(
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
     found, loops, refused = closed(frames, chain, found, sights, track)
+    weak, unknown = loops.copy(), unseen(frames)
+    weak["information"] /= TWICE
+    weak["loop"] = False
+    edges = np.append(chain, weak)
     if len(loops):
-        weak = loops.copy()
-        weak["information"] /= TWICE
-        weak["loop"] = False
-        found = optimise(found.poses, np.append(chain, weak), sights, count_of(sights), rounds=2)
-    parts = parts_of(found, chain, np.array([f.is_lost or f.is_contradicted for f in frames]))
+        found = optimise(found.poses, edges, sights, count_of(sights), rounds=2)
+    loose = loosened(edges, unknown)
+    found = as_known(found, loose, sights)
+    is_doubted = np.array([frame.is_lost or frame.is_contradicted for frame in frames])
+    parts = parts_of(found, loose[: len(chain)], is_doubted)
     found, chain, sights = apart(found, chain, sights, parts)
     if len(loops):
         sights = merged(sights, found.poses, found.lines, APART)
@@ -155,6 +159,7 @@ def make_map(
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
     found = optimise(found.poses, chain, sights, count_of(sights), held=parts.roots, rounds=2)
+    found = as_known(found, loosened(chain, unknown), sights, parts.roots)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights, track))
     walls = walls_by_part(survey, parts)
     frame_of = np.array([k for k, _ in scans], np.int64)
@@ -162,6 +167,12 @@ def make_map(
     of_walls = np.repeat(np.arange(parts.count), [len(of) for of in walls])
     plan = LineMap(np.concatenate(walls), sigma=MAPPED)
     return DriveMap(plan, of_walls, every, frame_of, survey, parts, loops, refused, chain, found)
+
+
+def as_known(found: Adjusted, edges: Records, sights: Records, held: int | Numbers = 0) -> Adjusted:
+    """Return poses that were adjusted as is likely, and how they are known by looser edges."""
+    known = optimise(found.poses, edges, sights, count_of(sights), held=held, rounds=0)
+    return replace(found, matrix=known.matrix)
 
 
 def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
