@@ -8,6 +8,7 @@ import pytest
 from lineament import Extractor, LaserScan
 from lineament.mapping import LineMap
 from lineament.mapping.around import Around, Sought, doubts, grid_around, open_ways
+from lineament.mapping.consistency import agreement
 from lineament.mapping.evidence import Says, evidence_of
 from lineament.mapping.local_map import beams_of
 from lineament.mapping.views import looked, views_of
@@ -160,6 +161,18 @@ def test_what_is_tried_where_walls_say_all_but_how_far(is_near):
 def test_elsewhere_it_is_lost():
     other = [[-1, 1, 1, 1], [1, 1, 1.2, -0.9], [1.2, -0.9, -1, -1.2], [-1, -1.2, -1, 1]]
     assert around(ROOM).place(*seen(other, (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), EXPECTED).is_lost
+
+
+@pytest.mark.parametrize("walls", [ROOM, CORRIDOR])
+def test_people_before_the_scanner_are_no_other_place(walls):
+    """They hide so much that a quarter of the ends differ; walls are where they were."""
+    people, near = [(1.0, 0.1, 0.3), (0.3, 1.0, 0.4), (0.3, -0.9, 0.3)], (0.06, 0.06, 0.03)
+    scan = SENSORS["utm30lx"].scan(World(walls, people), (0, 0, 0), np.random.default_rng(1))
+    here = around(walls)
+    assert agreement(here.scan, scan, [(0.0, 0.0, 0.0)])[0] < 0.75
+    found = here.place(scan, Extractor()(scan), (0.0, 0.0, 0.0), np.diag(near) ** 2)
+    assert not found.is_lost
+    np.testing.assert_allclose(found.motion.pose, 0, atol=0.02)
 
 
 def test_where_there_are_no_walls_it_is_lost():

@@ -16,7 +16,7 @@ SETTINGS = {
                "_SURER": 0.97, "_NARROW": 0.1, "_STEPS": 3, "_FARTHEST": 5.0, "_BEAMS": 120,
                "_SIFTED": ((12, 150), (40, 32)), "_WIDE": 0.12, "_FINAL": 0.07, "_TIGHT": 0.04,
                "_APART": (0.15, 0.06), "_CHOSEN": 12, "USUAL": 0.5, "_FREEDOM": 3.0, "_LOST": 0.38,
-               "_AGREE": 0.75, "_LAST": 60.0, "_OTHER": 0.3, "_DOUBT": 4.0,
+               "_AGREE": 0.75, "_CLEAR": 10.0, "_LAST": 60.0, "_OTHER": 0.3, "_DOUBT": 4.0,
                "_NEAR": np.diag((0.05, 0.05, 0.02)) ** 2},
     "chain": {"TWICE": 25.0, "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_LASTING": 2.5,
               "_FEW": 10.0, "_USUAL": 0.2, "_BESIDE": 6, "_SAME": (0.3, 0.3)},
