@@ -13,6 +13,7 @@ from ..scan import Array, LaserScan, Pose
 from ..walls import as_walls, wrapped
 from .consistency import LEAST, agreement, is_consistent
 from .evidence import Says, evidence_of
+from .following import DENIED
 from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off, voted
@@ -46,8 +47,8 @@ USUAL, _FREEDOM = 0.5, 3.0
 #: With less than this share of the beams explained, less contradicted, the way is lost.
 _LOST = 0.38
 #: With less than this share of the ends that agree, of those that this scan and the last key frame
-#: can both see, it is lost too, unless walls say so much of it [nats]: then people stand there. If
-#: all agree, that says so much of a pose [nats], beside the walls.
+#: can both see, it is lost too, unless walls say so much of it [nats] and few beams deny them: then
+#: people stand there. If all agree, that says so much of a pose [nats], beside the walls.
 _AGREE, _CLEAR, _LAST = 0.75, 10.0, 60.0
 #: Another place is so far away [m, rad]; the way is lost if one is less than 4 nats less likely.
 _OTHER, _DOUBT = 0.3, 4.0
@@ -132,7 +133,7 @@ class Around:
         motion = self._best(sought, motion, poses[nats.argmax()])
         evidence = self._evidence(motion, sought)
         is_lost = evidence[1] - _PASSED * evidence[3] < _LOST or evidence[0] < 0 or is_doubted
-        is_vague = evidence[0] < _CLEAR
+        is_vague = evidence[0] < _CLEAR or evidence[3] > DENIED
         is_lost |= is_vague and agreement(self.scan, scan, [motion.pose])[0] < _AGREE
         return Found(motion, None if motion.observable else by_beams, bool(is_lost), evidence)
 
