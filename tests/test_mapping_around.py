@@ -143,6 +143,17 @@ def test_a_door_in_the_corridor_shows_how_far():
     np.testing.assert_allclose(found.motion.pose, (1.1, 0.1, 0.1), atol=0.05)
 
 
+@pytest.mark.parametrize(("ends", "least", "most"), [([], 1.2, 1.5), ([6.0], 0.05, 0.8)])
+def test_what_beams_alone_leave_open(ends, least, most):
+    """All of the five metres that are looked at; half, where the end of the corridor is in view."""
+    walls = [*CORRIDOR, *([x, -1, x, 1] for x in ends)]
+    scan, features = seen(walls, (0.8, 0.1, 0.1))
+    at = Motion(0.8, 0.1, 0.1, EXPECTED, np.array([(1.0, 0.0, 0.0)]))
+    covariance = around(walls).alone(scan, features, at)
+    assert least <= math.sqrt(covariance[0, 0]) < most
+    np.testing.assert_allclose(covariance[1:, 1:], BESIDE[1:, 1:])
+
+
 @pytest.mark.parametrize("is_near", [True, False])
 def test_what_is_tried_where_walls_say_all_but_how_far(is_near):
     """Poses along the walls; of a bend that odometry has not seen, others too."""
