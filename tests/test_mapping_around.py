@@ -149,7 +149,7 @@ def test_what_beams_alone_leave_open(ends, least, most):
     walls = [*CORRIDOR, *([x, -1, x, 1] for x in ends)]
     scan, features = seen(walls, (0.8, 0.1, 0.1))
     at = Motion(0.8, 0.1, 0.1, EXPECTED, np.array([(1.0, 0.0, 0.0)]))
-    covariance = around(walls).alone(scan, features, at)
+    covariance = around(walls).beams_alone(scan, features, at)
     assert least <= math.sqrt(covariance[0, 0]) < most
     np.testing.assert_allclose(covariance[1:, 1:], BESIDE[1:, 1:])
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from lineament import Extractor, LaserScan
+from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.chain import loosened, unseen
 from lineament.mapping.drive_map import Drive, KeyFrame
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import between
+from lineament.mapping.sessions import merge_onto, placements
 from lineament.motion.estimate import Motion
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, World
@@ -40,7 +42,7 @@ def key(k, step, duration, is_bare=False):
         motion=motion,
         duration=duration,
         expected=SURE,
-        alone=OPEN if is_bare else None,
+        beams_alone=OPEN if is_bare else None,
         is_lost=False,
         has_odometry=False,
         off=np.zeros(3),
@@ -72,7 +74,7 @@ def test_beams_may_know_it_better():
     frames = [key(k, 0.3, 1.0, True) for k in range(30)]
     by_speed = along(frames)
     assert np.all(np.diff(by_speed) > 0)
-    frames[20].alone = np.diag((0.1, 0.05, 0.02)) ** 2
+    frames[20].beams_alone = np.diag((0.1, 0.05, 0.02)) ** 2
     by_both = along(frames)
     np.testing.assert_allclose(by_both[:20], by_speed[:20])
     np.testing.assert_allclose(by_both[20], 0.1**2)
@@ -156,7 +158,7 @@ def test_a_robot_that_stops_in_a_bare_corridor_does_not_know_how_long_that_is():
     at = np.array([truth[frame.index] for frame in drive.frames])
     off = np.subtract([frame.pose[0] for frame in drive.frames], at[:, 0] + 5)
     assert abs(off[-1]) > 0.75
-    bare = [frame.alone[0, 0] for frame in drive.frames if frame.alone is not None]
+    bare = [frame.beams_alone[0, 0] for frame in drive.frames if frame.beams_alone is not None]
     assert len(bare) > 20
     assert np.median(bare) > 1.0
     made = make_map(drive.frames, drive.scans)
@@ -172,16 +174,39 @@ def test_a_robot_that_stops_in_a_bare_corridor_does_not_know_how_long_that_is():
         assert np.ptp(errors) < 3 * made.parts.deviations.max()
 
 
-def test_doors_show_how_far():
-    """Beams alone know it better by the recesses of doors; the way is known to centimetres."""
-    jambs = [
-        *([0, 1, 3, 1], [3, 1, 3, 1.2], [3, 1.2, 4, 1.2], [4, 1.2, 4, 1], [4, 1, 11, 1]),
-        *([11, 1, 11, 1.2], [11, 1.2, 12, 1.2], [12, 1.2, 12, 1], [12, 1, 20, 1]),
-        *([20, 1, 20, 1.2], [20, 1.2, 21, 1.2], [21, 1.2, 21, 1], [21, 1, 31, 1]),
-    ]
-    drive, truth = driven(np.full(520, 0.7), [*ENDS, [0, -1, 31, -1], *jambs])
-    made, last = make_map(drive.frames, drive.scans), len(drive.frames) - 1
+#: A wall of the corridor with recesses of doors, the first two before the twelfth metre.
+DOORS = [
+    *([0, 1, 3, 1], [3, 1, 3, 1.2], [3, 1.2, 4, 1.2], [4, 1.2, 4, 1], [4, 1, 11, 1]),
+    *([11, 1, 11, 1.2], [11, 1.2, 12, 1.2], [12, 1.2, 12, 1], [12, 1, 20, 1]),
+    *([20, 1, 20, 1.2], [20, 1.2, 21, 1.2], [21, 1.2, 21, 1], [21, 1, 31, 1]),
+]
+
+
+@pytest.fixture(scope="module")
+def by_doors():
+    """The map of a drive along doors, and where its key frames were taken."""
+    drive, truth = driven(np.full(520, 0.7), [*ENDS, [0, -1, 31, -1], *DOORS])
+    return make_map(drive.frames, drive.scans), [truth[frame.index] for frame in drive.frames]
+
+
+def test_doors_show_how_far(by_doors):
+    """Beams alone know it better by the recesses of doors."""
+    made, truth = by_doors
+    last = len(truth) - 1
     spread = between(made.survey.poses, np.array([(0, last)]), made.adjusted.solver())[0]
-    true = relative(truth[0], truth[drive.frames[last].index])
+    true = relative(truth[0], truth[last])
     off = np.subtract(relative(made.survey.pose(0), made.survey.pose(last)), true)
+    assert made.parts.count == 1
     assert abs(off[0]) < 3 * math.sqrt(spread[0, 0]) < 1.5
+
+
+def test_on_a_plan_of_one_end_the_other_is_known_as_the_way_to_it_is(by_doors):
+    """The wall behind the second room, 38 m off, is not known as well as those of the plan."""
+    made, _ = by_doors
+    plan = LineMap.from_lines([*ENDS[:5], *ENDS[10:12], [0, -1, 12, -1], *DOORS[:8]])
+    walls = merge_onto(made, plan, placements(made, plan)).made.map.walls
+    behind = walls[(abs(walls["centroid"][:, 0] - 38) < 1) & (abs(np.cos(walls["angle"])) < 0.1)]
+    claimed = np.sqrt(behind["covariance"][:, 0, 0])
+    assert len(behind)
+    assert 0.2 < claimed.min() <= claimed.max() < 0.6
+    assert (abs(behind["centroid"][:, 0] - 38) < 2 * claimed).all()

@@ -137,7 +137,7 @@ class Around:
         is_lost |= is_vague and agreement(self.scan, scan, [motion.pose])[0] < _AGREE
         return Found(motion, None if motion.observable else by_beams, bool(is_lost), evidence)
 
-    def alone(self, scan: LaserScan, features: Features, motion: Motion) -> Array:
+    def beams_alone(self, scan: LaserScan, features: Features, motion: Motion) -> Array:
         """Return the covariance that beams alone leave along what no wall shows.
 
         Any pose less than 4 nats less likely than the best may be right: beams that say less say it

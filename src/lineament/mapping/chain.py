@@ -47,13 +47,13 @@ def unseen(frames: list[KeyFrame]) -> Array:
     """
     found, since, deviation = np.zeros((len(frames), 3, 3)), 0.0, _deviation(frames)
     for k, frame in enumerate(frames):
-        if frame.alone is None:
+        if frame.beams_alone is None:
             since = 0.0
             continue
         before, since = since, since + frame.duration
         by_speed = deviation**2 * (_wandered(since) - _wandered(before))
         for u in open_ways(frame.motion):
-            by_beams = float(u @ frame.alone[:2, :2] @ u)
+            by_beams = float(u @ frame.beams_alone[:2, :2] @ u)
             found[k, :2, :2] += min(by_speed, by_beams) * np.outer(u, u)
             since = since if by_speed < by_beams else 0.0
     return found

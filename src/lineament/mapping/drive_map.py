@@ -46,8 +46,8 @@ class KeyFrame:
     first key frame, `motion` that since the one before: a guess where the way is lost, unless it
     `has_odometry`, of so long a `duration` [s]. `expected` is its covariance before walls are
     matched: by odometry, by how it went on, or by beams where no wall shows how far. There, without
-    odometry, `alone` is that by beams alone. `off` is what walls say beside what was expected since
-    the key frame before [m, m, rad].
+    odometry, `beams_alone` is that by beams alone. `off` is what walls say beside what was expected
+    since the key frame before [m, m, rad].
     """
 
     index: int
@@ -58,7 +58,7 @@ class KeyFrame:
     motion: Motion
     duration: float
     expected: Array
-    alone: Array | None
+    beams_alone: Array | None
     is_lost: bool
     has_odometry: bool
     off: Array
@@ -141,8 +141,8 @@ class Drive(InTurn):
             off = np.zeros(3) if by is None else np.subtract(motion.pose, by)
             off[2] = wrapped(off[2])
             is_bare = not (is_lost or has_odometry or motion.observable)
-            alone = self._around.alone(scan, features, motion) if is_bare else None
-            self._key(features, motion, scan, (alone, is_lost, has_odometry, off))
+            beams_alone = self._around.beams_alone(scan, features, motion) if is_bare else None
+            self._key(features, motion, scan, (beams_alone, is_lost, has_odometry, off))
             self._lasted, self._spread, self._from = 0.0, np.zeros((3, 3)), odometry
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
@@ -196,7 +196,8 @@ class Drive(InTurn):
         """Take a key frame; its segments are walls that are known, or new ones."""
         here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
-        if found[1]:
+        _, is_lost, *_ = found
+        if is_lost:
             self._first = len(self.frames)
         elif self.frames:
             around = self._around.features.transform(*inverse(motion.pose))

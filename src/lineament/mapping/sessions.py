@@ -22,12 +22,12 @@ from ..walls import (
 )
 from ..walls.sights import joined, on_lines, sights_of, stretches
 from .adjust import Adjusted, edges_of, optimise
-from .chain import TWICE
+from .chain import TWICE, loosened, unseen
 from .gone import along_lines, keys_of, looked_through, pieces_of, standing
 from .index import MAPPED
 from .line_map import LineMap
 from .loops import FLOOR, Survey
-from .making import APART, VIEWS, DriveMap, single
+from .making import APART, VIEWS, DriveMap, as_known, single
 from .parts import beside, boxes_of
 from .placing import FEWEST, PLACES, Placement, is_enough, surely_on
 
@@ -196,7 +196,8 @@ def _adjusted(
         sights, _ = joined(sights, APART, adjusted.poses)
         count = int(sights["wall"].max()) + 1
         adjusted = optimise(adjusted.poses, edges, sights, count, held=held, rounds=2)
-    return adjusted, sights
+    loose = loosened(edges, unseen(placed.survey.frames))
+    return as_known(adjusted, loose, sights, held), sights
 
 
 def _united(
