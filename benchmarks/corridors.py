@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from lineament import Extractor
+from lineament.logs import open_log
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.chain import loosened, spread_of, unseen
 from lineament.mapping.drive_map import Drive
@@ -29,6 +33,16 @@ CHANGES, SLOWEST, FASTEST = 0.02, 0.15, 1.1
 DEPTH, WIDTH, ROUGH = 0.12, 0.9, 0.01
 
 
+DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
+LOGS = {
+    "fr079": "truth/fr079_graph.npz",
+    "ACES": "carmen/aces-corrected.log.gz",
+    "arena": "truth/jackal_mocap_02171554.npz",
+    "Acapulco": "carmen/acapulco-corrected.log.gz",
+    "Killian": "graph/killian.g2o.zip",
+}
+#: Times over which changes of speed are averaged [s]; slower, a robot stands [m/s].
+TIMES, STANDING = (1.0, 2.0, 4.0, 8.0), 0.1
 COLUMNS = (
     "scans/s",
     "doors",
@@ -116,6 +130,23 @@ def off_and_claimed(seed, rate, doors):
     return came[0] - true[0], *np.sqrt(spreads)
 
 
+def changes(scans):
+    """Return the mean square of the change of speed over each of the times [m²/s²]."""
+    stamps = np.array([scan.stamp for scan in scans])
+    steps = [relative(a.pose, b.pose)[0] for a, b in pairwise(scans)]
+    times, at = np.diff(stamps), (stamps[1:] + stamps[:-1]) / 2
+    speeds = np.where((times > 0.05) & (times < 5), steps / np.maximum(times, 1e-6), np.nan)
+    found = []
+    for time in TIMES:
+        later = np.searchsorted(at, at + time)
+        first = np.flatnonzero(later < len(at))
+        later = later[first]
+        is_near = abs(at[later] - at[first] - time) < time / 2
+        is_going = (speeds[first] > STANDING) | (speeds[later] > STANDING)
+        found.append(np.nanmean((speeds[later] - speeds[first])[is_near & is_going] ** 2))
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--drives", type=int, default=24)
@@ -123,7 +154,14 @@ def main() -> None:
     parser.add_argument(
         "--doors", type=int, nargs="+", default=[0, 8], help="recesses to each side"
     )
+    parser.add_argument("--speeds", action="store_true", help="of recordings")
     chosen = parser.parse_args()
+    if chosen.speeds:
+        print("|log|" + "|".join(f"{time:g} s" for time in TIMES) + "|\n" + "|---" * 5 + "|")
+        for name, path in LOGS.items():
+            found = changes(list(open_log(DATA / path)))
+            print(f"|{name}|" + "|".join(f"{square:.3f}" for square in found) + "|")
+        return
     print("|" + "|".join(COLUMNS) + "|\n" + "|---" * len(COLUMNS) + "|")
     for rate in chosen.rates:
         for doors in chosen.doors:
