@@ -123,7 +123,7 @@ def is_beside(a, b, motion, spread, roughness, shared, turn):
 
 def residuals(matches, motion, roughness):
     """List (error, jacobian, information, what is feigned) of each pair under a motion."""
-    listed = []
+    listed, shown = [], set()
     for kind in KINDS:
         for i, j in getattr(matches, kind):
             a, b = getattr(matches.before, kind)[i], getattr(matches.now, kind)[j]
@@ -137,14 +137,16 @@ def residuals(matches, motion, roughness):
                 if covariance[1, 1] > 0.1**2:
                     listed.append((error, jacobian, np.zeros((2, 2)), feigned))
                     continue
+                shown.add(int(j))
                 dx, dy = moved(b["centroid"], motion) - motion[:2]
                 c, s = np.cos(a["angle"]), np.sin(a["angle"])
                 slope = np.sqrt(covariance[1, 1] / covariance[0, 0])
                 feigned = slope * np.array([c, s, s * dx - c * dy])
             information = np.linalg.inv(covariance)
             if kind == "corners":
-                # It is where its segments meet: of one that is matched, the place along it is new.
-                known = [k for k in b["segments"] if k >= 0 and k in matches.segments[:, 1]]
+                # It is where its segments meet: of one that shows a motion, the place along it is
+                # new.
+                known = [k for k in b["segments"] if int(k) in shown]
                 if known:
                     angle = matches.now.segments["angle"][known[0]] + motion[2]
                     u = np.array([np.cos(angle), np.sin(angle)])

@@ -125,6 +125,21 @@ def test_walls_that_are_parallel_but_for_their_errors_leave_a_direction_open(tur
     assert len(estimate_motion(moved_by((0.0, 0.0, 0.0), segments=walls)).unobserved) == lost
 
 
+@pytest.mark.parametrize("directed", [0.06, 0.08])
+def test_the_jamb_of_a_door_shows_a_motion_by_itself_or_by_its_corner(directed):
+    """Jambs of 0.1 m whose directions are known to 85 and 113 mrad: the second is left to it."""
+    ends = ((-9, -1), (9, -1)), ((3, 1), (-9, 1)), ((3, 1.1), (3, 1))
+    sigmas = (0.001, 0.0001), (0.001, 0.0001), (0.01, directed)
+    walls = [segment(*pair, 0, 9, sigma=of) for pair, of in zip(ends, sigmas, strict=True)]
+    matches = moved_by((0.1, 0.0, 0.0), segments=walls, corners=[corner(3, 1, segments=(2, 1))])
+    motion = estimate_motion(matches, (0.0, 0.0, 0.0), WIDE)
+    assert motion.observable
+    # Two measurements of 1 cm, and what was known to 10 cm before.
+    known = 1 / (2 * 0.01**2)
+    assert motion.x == pytest.approx(0.1 * known / (known + 100), abs=1e-3)
+    assert motion.covariance[0, 0] == pytest.approx(1 / (known + 100), rel=0.02)
+
+
 @pytest.mark.parametrize(
     "covariance",
     [

@@ -76,10 +76,11 @@ def estimate_motion(
     """Estimate the motion between two frames by weighted least squares, robustly.
 
     Gauss-Newton on the offset and angle of each segment from its earlier line, and on the distance
-    of each corner and arc from where it was, each by the covariance of both. A corner is the
-    intersection of its two segments: where both are matched it is nothing new and is left out;
-    where one is, its place along that one counts alone. Pairs beyond the 99 % quantile of χ² count
-    less, by the square of how far they are off.
+    of each corner and arc from where it was, each by the covariance of both. A segment that is too
+    short for its direction to be known to 0.1 rad, such as the jamb of a door, is left to its
+    corners. A corner is the intersection of its two segments: where both count it is nothing new
+    and is left out; where one does, its place along that one counts alone. Pairs beyond the 99 %
+    quantile of χ² count less, by the square of how far they are off.
 
     The covariances of the segments, of noise alone, count whole. The misfit of a wall is the same
     in both frames: it counts by the part of the wall that one frame saw alone.

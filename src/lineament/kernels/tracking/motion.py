@@ -61,21 +61,21 @@ def estimate_motion(
         The number of directions that are not observed; NOT_POSITIVE if `spread` is not positive
         definite, NOT_THERE if pairs name features that are not there.
     """
-    matrices, vectors, rows, squares, matched = scratch
+    matrices, vectors, rows, squares, counted = scratch
     known, information, feigned = matrices[0], matrices[1], matrices[2]
     total, kept = matrices[3], matrices[4]
     scale, gradient, off = vectors[0], vectors[1], vectors[2]
     state, covariance, directions = found[0, 0], found[1], found[2]
     if not invert(spread, known):
         return NOT_POSITIVE
-    if not _mark(before, now, pairs, matched):
+    if not _are_there(before, now, pairs):
         return NOT_THERE
     for k in range(3):
         state[k], scale[k] = prior[k], 1.0
     scale[2] = _distance(now, pairs)
     lost = 0
     for _ in range(_ROUNDS):
-        n = fill_residuals(before, now, sides, pairs, matched, state, roughness, rows)
+        n = fill_residuals(before, now, sides, pairs, counted, state, roughness, rows)
         _add_up(rows, n, _limit(rows, n, squares, quantiles), information, gradient, feigned)
         lost = _unobserved(information, feigned, scale, total, kept, directions)
         # Nothing is taken from the features in directions that they do not show.
@@ -91,15 +91,13 @@ def estimate_motion(
 
 
 @helper
-def _mark(before, now, pairs, matched):
-    """Mark the later segments that are in a pair; whether all pairs are of features there are."""
+def _are_there(before, now, pairs):
+    """Whether all pairs are of features that there are."""
     for kind in range(3):
         for k in range(len(pairs[kind])):
             i, j = pairs[kind][k, 0], pairs[kind][k, 1]
             if not (0 <= i < len(before[kind]) and 0 <= j < len(now[kind])):
                 return False
-    for k in range(len(pairs[0])):
-        matched[pairs[0][k, 1]] = 1
     return True
 
 

@@ -24,23 +24,25 @@ _DIRECTED = 0.1
 
 
 @helper
-def fill_residuals(before, now, sides, pairs, matched, motion, roughness, rows):
+def fill_residuals(before, now, sides, pairs, counted, motion, roughness, rows):
     """Fill a row of `rows` for each pair, of segments first, then corners and arcs.
 
-    `matched` says of each later segment whether it is in a pair, `sides` between which segments the
-    later corners are. A pair whose covariance is not known does not count.
+    `sides` says between which segments the later corners are; `counted`, which is filled too, of
+    each later segment whether it is in a pair that counts. A pair whose covariance is not known
+    does not.
     """
     c, s = math.cos(motion[2]), math.sin(motion[2])
     n = 0
     for k in range(len(pairs[0])):
         i, j = pairs[0][k, 0], pairs[0][k, 1]
-        _of_segments(before[0][i], now[0][j], motion, c, s, roughness, rows[n])
+        # One that shows no motion leaves it to its corners.
+        counted[j] = _of_segments(before[0][i], now[0][j], motion, c, s, roughness, rows[n])
         n += 1
     for k in range(len(pairs[1])):
         i, j = pairs[1][k, 0], pairs[1][k, 1]
         a, b = before[1][i], now[1][j]
         _of_points(a, b, at.C_POSITION, at.C_COVARIANCE, 2, motion, c, s, roughness, rows[n])
-        _leave_known(now[0], sides, j, matched, motion[2], rows[n])
+        _leave_known(now[0], sides, j, counted, motion[2], rows[n])
         n += 1
     for k in range(len(pairs[2])):
         i, j = pairs[2][k, 0], pairs[2][k, 1]
@@ -56,7 +58,7 @@ def fill_residuals(before, now, sides, pairs, matched, motion, roughness, rows):
 
 @helper
 def _of_segments(a, b, motion, c, s, roughness, row):
-    """Offset of the later centroid from the earlier line, and the angle between the two.
+    """Offset of the later centroid from the earlier line, and the angle between; if it counts, 1.
 
     The misfit of a wall is the same in both frames, so far as both saw the same of it: it counts by
     the part that one of them saw alone.
@@ -85,7 +87,7 @@ def _of_segments(a, b, motion, c, s, roughness, row):
         row[k] = 0.0
     determinant = oo * aa - oa * oa
     if aa > _DIRECTED * _DIRECTED or not determinant > 0.0:
-        return
+        return 0
     turn = turned(b[at.S_ANGLE] + motion[2] - a[at.S_ANGLE])
     row[ERROR], row[ERROR + 1] = ay * tx - ax * ty, turn
     row[JACOBIAN], row[JACOBIAN + 1], row[JACOBIAN + 2] = -ty, tx, tx * px + ty * py
@@ -96,6 +98,7 @@ def _of_segments(a, b, motion, c, s, roughness, row):
     slope = math.sqrt(aa / oo)
     row[FEIGNED], row[FEIGNED + 1] = slope * tx, slope * ty
     row[FEIGNED + 2] = slope * (px * ty - py * tx)
+    return 1
 
 
 @helper
@@ -120,12 +123,12 @@ def _of_points(a, b, place, covariance, size, motion, c, s, roughness, row):
 
 
 @helper
-def _leave_known(segments, sides, j, matched, turn, row):
-    """Leave out of a corner what its matched segments say: it is where they meet."""
+def _leave_known(segments, sides, j, counted, turn, row):
+    """Leave out of a corner what its segments say that count: it is where they meet."""
     matches, angle = 0, 0.0
     for side in range(2):
         segment = sides[j, side]
-        if 0 <= segment < len(matched) and matched[segment]:
+        if 0 <= segment < len(counted) and counted[segment]:
             matches += 1
             if matches == 1:
                 angle = segments[segment, at.S_ANGLE] + turn
