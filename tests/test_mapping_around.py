@@ -112,7 +112,7 @@ ROOM = [
 
 @pytest.mark.parametrize("pose", [(0.9, 0.1, 0.2), (0.0, 0.0, -1.6), (-1.2, -0.5, 1.0)])
 def test_in_a_room_a_jump_is_found(pose):
-    found = around(ROOM).place(*seen(ROOM, pose), (0.3, 0.0, 0.0), EXPECTED)
+    found = around(ROOM).place(*seen(ROOM, pose), (0.3, 0.0, 0.0), EXPECTED, False)
     assert not found.is_lost
     assert found.by_beams is None
     np.testing.assert_allclose(found.motion.pose, pose, atol=0.02)
@@ -120,11 +120,15 @@ def test_in_a_room_a_jump_is_found(pose):
 
 def test_a_room_that_is_alike_when_it_is_turned_is_a_doubt():
     """Most of what is seen now, the first scan did not see: it looks 270° around."""
-    assert around(ROOM).place(*seen(ROOM, (0.0, 0.0, -2.5)), (0.3, 0.0, 0.0), EXPECTED).is_lost
+    assert (
+        around(ROOM).place(*seen(ROOM, (0.0, 0.0, -2.5)), (0.3, 0.0, 0.0), EXPECTED, False).is_lost
+    )
 
 
 def test_in_a_bare_corridor_the_motion_goes_on_and_is_known_no_better():
-    found = around(CORRIDOR).place(*seen(CORRIDOR, (0.8, 0.1, 0.1)), (0.8, 0.0, 0.0), EXPECTED)
+    found = around(CORRIDOR).place(
+        *seen(CORRIDOR, (0.8, 0.1, 0.1)), (0.8, 0.0, 0.0), EXPECTED, False
+    )
     assert not found.is_lost
     assert found.by_beams is not None
     np.testing.assert_allclose(found.motion.pose[1:], (0.1, 0.1), atol=0.02)
@@ -138,7 +142,7 @@ def test_a_door_in_the_corridor_shows_how_far():
         *([-2, 1, 2.5, 1], [2.5, 1, 2.5, 1.2], [2.5, 1.2, 3.6, 1.2], [3.6, 1.2, 3.6, 1]),
         *([3.6, 1, 40, 1], [40, -1, -40, -1]),
     ]
-    found = around(doors).place(*seen(doors, (1.1, 0.1, 0.1)), (0.3, 0.0, 0.0), EXPECTED)
+    found = around(doors).place(*seen(doors, (1.1, 0.1, 0.1)), (0.3, 0.0, 0.0), EXPECTED, False)
     assert not found.is_lost
     np.testing.assert_allclose(found.motion.pose, (1.1, 0.1, 0.1), atol=0.05)
 
@@ -171,17 +175,19 @@ def test_what_is_tried_where_walls_say_all_but_how_far(is_near):
 
 def test_elsewhere_it_is_lost():
     other = [[-1, 1, 1, 1], [1, 1, 1.2, -0.9], [1.2, -0.9, -1, -1.2], [-1, -1.2, -1, 1]]
-    assert around(ROOM).place(*seen(other, (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), EXPECTED).is_lost
+    assert (
+        around(ROOM).place(*seen(other, (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), EXPECTED, False).is_lost
+    )
 
 
 @pytest.mark.parametrize("walls", [ROOM, CORRIDOR])
 def test_people_before_the_scanner_are_no_other_place(walls):
     """They hide so much that a quarter of the ends differ; walls are where they were."""
-    people, near = [(1.0, 0.1, 0.3), (0.3, 1.0, 0.4), (0.3, -0.9, 0.3)], (0.06, 0.06, 0.03)
+    people, near = [(1.0, 0.1, 0.3), (0.3, 1.0, 0.4), (0.3, -0.9, 0.3)], (0.2, 0.2, 0.03)
     scan = SENSORS["utm30lx"].scan(World(walls, people), (0, 0, 0), np.random.default_rng(1))
     here = around(walls)
     assert agreement(here.scan, scan, [(0.0, 0.0, 0.0)])[0] < 0.75
-    found = here.place(scan, Extractor()(scan), (0.0, 0.0, 0.0), np.diag(near) ** 2)
+    found = here.place(scan, Extractor()(scan), (0.0, 0.0, 0.0), np.diag(near) ** 2, True)
     assert not found.is_lost
     np.testing.assert_allclose(found.motion.pose, 0, atol=0.02)
 
@@ -189,7 +195,7 @@ def test_people_before_the_scanner_are_no_other_place(walls):
 def test_where_there_are_no_walls_it_is_lost():
     scan = LaserScan(np.full(90, np.nan), -0.5, 0.01)
     nothing = Around.of(Extractor()(scan), scan, views_of(np.zeros((1, 3)), [looked(scan)]))
-    found = nothing.place(scan, Extractor()(scan), (0.5, 0.0, 0.0), EXPECTED)
+    found = nothing.place(scan, Extractor()(scan), (0.5, 0.0, 0.0), EXPECTED, False)
     assert found.is_lost
     np.testing.assert_allclose(found.motion.pose, (0.5, 0.0, 0.0))
 

@@ -327,6 +327,23 @@ def test_in_a_bare_corridor_a_robot_goes_on_by_more_than_its_last_two_scans():
     assert at[0] - seen == pytest.approx(339 * 0.02, rel=0.02)
 
 
+@pytest.mark.parametrize("rate", [10, 40])
+def test_jambs_of_doors_show_how_far(rate):
+    """Of 15 cm, too short to say where they point: their corners say where they are."""
+    walls, begin = [[-8, -2, -8, 2], [60, -1, -8, -1]], -8.0
+    for x in range(-3, 60, 4):
+        walls += [[begin, 1, x, 1], [x, 1, x, 1.15], [x, 1.15, x + 0.9, 1.15]]
+        walls.append([x + 0.9, 1.15, x + 0.9, 1])
+        begin = x + 0.9
+    world, rng = World([*walls, [begin, 1, 60, 1]]), np.random.default_rng(0)
+    extract, way = Extractor(), Drive()
+    for k in range(8 * rate):
+        scan = SENSORS["utm30lx"].scan(world, (0.9 * k / rate - 6.0, 0.0, 0.0), rng)
+        at = way.add(scan.stamped(0, k * (10**9 // rate)), extract(scan)).pose
+    assert not any(frame.is_lost for frame in way.frames)
+    assert at[0] == pytest.approx(0.9 * k / rate, abs=0.05)
+
+
 def test_one_scan_is_a_map():
     scan = next(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms361"]))
     placed = Drive()

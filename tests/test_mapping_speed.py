@@ -208,5 +208,5 @@ def test_on_a_plan_of_one_end_the_other_is_known_as_the_way_to_it_is(by_doors):
     behind = walls[(abs(walls["centroid"][:, 0] - 38) < 1) & (abs(np.cos(walls["angle"])) < 0.1)]
     claimed = np.sqrt(behind["covariance"][:, 0, 0])
     assert len(behind)
-    assert 0.2 < claimed.min() <= claimed.max() < 0.6
+    assert 0.1 < claimed.min() <= claimed.max() < 0.6
     assert (abs(behind["centroid"][:, 0] - 38) < 2 * claimed).all()

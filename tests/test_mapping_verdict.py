@@ -308,15 +308,15 @@ def test_the_command_says_what_does_not_hang_together(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("log", "most", "parts", "worst"),
-    [("csail", 1.0, 1, 0.2), ("intel", 40.0, 1, 0.4), ("aces", 30.0, None, 0.4)],
+    [("csail", 7.0, 1, 0.15), ("intel", 40.0, 1, 0.4), ("aces", 30.0, 1, 0.2)],
 )
 def test_real_logs_say_where_they_are_not_sure(data_dir, log, most, parts, worst):
-    """Each part is right within; ACES without odometry breaks where its corridors are bare."""
+    """Each is whole without odometry, and names the places where it was lost or saw little."""
     path = data_dir / f"carmen/{log}-corrected.log.gz"
     scans = list(open_log(path))
     made = mapped(scans, [None] * len(scans))
     assert sum(way for *_, way in made.unsure) <= most
-    assert parts in (None, made.parts.count)
+    assert made.parts.count == parts
     errors = errors_by_part(made, [scan.pose for scan in scans])
     assert max(errors) < worst
     for error, deviation in zip(errors, made.parts.deviations, strict=True):

@@ -18,7 +18,7 @@ HERE = (0.0, 0.0, 0.0)
 
 
 def ring(ranges, first=0.0):
-    """Return a scan of a whole circle whose beams are farther apart than a motion is unsure."""
+    """Return a scan of a whole circle; an end at a beam is beside that one and one on each side."""
     step = 2 * math.pi / len(ranges)
     return LaserScan(np.asarray(ranges, float), first, step)
 
@@ -38,10 +38,11 @@ def test_what_lies_behind_says_nothing_but_what_was_before_it_is_gone():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 0.0])
 def test_few_beams_say_nothing(bad):
+    """The other scan has 19 ends beside 17 beams, which look through them; 20 beside 18."""
     few = np.full(100, bad)
-    few[:19] = 4.0
+    few[:17] = 4.0
     assert is_consistent(ring(np.full(100, 2.0)), ring(few), HERE)
-    few[:20] = 4.0
+    few[:18] = 4.0
     assert not is_consistent(ring(np.full(100, 2.0)), ring(few), HERE)
     assert is_consistent(ring(few), ring(np.full(100, bad)), HERE)
 
@@ -64,7 +65,8 @@ def test_turns_are_followed_across_the_ends_of_the_circle(turn):
 def naive(before, scan, motion):
     """Count the ends that are explained and contradicted, one beam after the other."""
     near = 0.08 + 0.1 * math.dist(motion[:2], (0, 0))
-    turned = 0.015 + 0.1 * abs(math.remainder(motion[2], math.tau))
+    spacing = max(before.angle_increment, scan.angle_increment)
+    turned = max(0.015, 1.01 * spacing) + 0.1 * abs(math.remainder(motion[2], math.tau))
     explained = contradicted = 0
     for ends, beams, pose in ((scan, before, motion), (before, scan, inverse(motion))):
         for r, bearing in zip(ends.ranges[ends.valid], ends.angles[ends.valid], strict=True):
@@ -105,6 +107,17 @@ def test_it_counts_as_a_loop_over_beams_does():
         assert found[-1] == (not share < 0.85)
         assert found[-1] == is_consistent(after, before, inverse(motion))
     assert 30 < sum(found) < 120
+
+
+@pytest.mark.parametrize("sensor", ["paper", "lms181", "utm30lx", "rplidar", "ld19"])
+def test_in_a_bare_corridor_all_motions_along_it_agree_alike(sensor):
+    """Else a robot that drives seems to stand, where the beams of both scans lie on each other."""
+    world, along = World([[-60, 1, 60, 1], [60, -1, -60, -1]]), np.linspace(-0.3, 0.3, 13)
+    motions = np.column_stack((along, np.zeros((13, 2))))
+    for step in (0.0, 0.03, 0.1, 0.2):
+        rng = np.random.default_rng(1)
+        here, there = (SENSORS[sensor].scan(world, (x, 0.0, 0.0), rng) for x in (0.0, step))
+        assert np.ptp(agreement(here, there, motions)) < 0.01
 
 
 @pytest.mark.parametrize("sensor", ["paper", "lms181", "utm30lx", "rplidar", "ld19"])

@@ -27,8 +27,8 @@ _MILD, _PASSED = -0.8, 0.5
 _SAYS = Says(math.log(7 / 3) + 0.5, math.log(0.7), _MILD)
 _ROUNDS = 4
 #: With at least this share of the beams explained, less contradicted, a place is taken at once;
-#: more where the deviation of what is expected is larger than that [m].
-_SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
+#: more where the last scan was long ago.
+_SURE, _SURER = 0.75, 0.97
 #: Steps of a grid around the expected pose, to each side; farther than so many deviations off it,
 #: no pose is tried.
 _STEPS, _FARTHEST = 3, 5.0
@@ -113,16 +113,20 @@ class Around:
         walls = as_walls(features.segments)
         return cls(features, scan, views, LineMap(walls) if len(walls) else _NOWHERE)
 
-    def place(self, scan: LaserScan, features: Features, prior: Pose, spread: Array) -> Found:
-        """Find the pose by the walls; if it may be another, the one that explains most."""
+    def place(
+        self, scan: LaserScan, features: Features, prior: Pose, spread: Array, is_soon: bool
+    ) -> Found:
+        """Find the pose by the walls; if it may be another, the one that explains most.
+
+        `is_soon` is whether the last scan was so short a time ago that few others are possible.
+        """
         sought = Sought(scan, features, some(beams_of(features, scan), _BEAMS), prior, spread)
         motion = self._match(features, prior, spread)
         evidence = self._evidence(motion, sought)
-        is_narrow = math.sqrt(spread[0, 0]) < _NARROW
-        is_sure = evidence[1] - evidence[3] >= (_SURE if is_narrow else _SURER)
+        is_sure = evidence[1] - evidence[3] >= (_SURE if is_soon else _SURER)
         if is_sure and motion.observable:
             return Found(motion, None, False, evidence)
-        is_along = is_sure and is_narrow and is_consistent(self.scan, scan, motion.pose)
+        is_along = is_sure and is_soon and is_consistent(self.scan, scan, motion.pose)
         poses = self._searched(sought, motion, is_along)
         nats = self._nats(sought, poses, _FINAL)
         # The motion that was matched is preferred by a little.

@@ -13,6 +13,10 @@ from .local_map import some
 #: Errors of a motion from scan to scan, and their growth with way and turn [m, rad]: beams end so
 #: near to those of the other scan, and beside some of them that are turned by so much.
 _NEAR, _TURNED, _GROWTH = 0.08, 0.015, 0.1
+#: An end lies between two beams, so those beside it are as far as their spacing, and a little more.
+#: The farther one of both alone seems to look through a wall along a corridor, unless the scans are
+#: of one place, where beams lie on each other: then a robot that drives is thought to stand.
+_SPACED = 1.01
 #: Two scans of one place explain at least this share of the ends that both of them can see: people,
 #: doors and glass take up to 8 % of them from scan to scan, a place elsewhere most.
 LEAST = 0.85
@@ -35,7 +39,8 @@ def agreement(before: LaserScan, scan: LaserScan, motions: ArrayLike) -> Array:
     old, new, of = _by_bearing(before), _by_bearing(scan), np.array(motions, float).reshape(-1, 3)
     ends = [beams[:, :1] * unit(beams[:, 1]) for beams in (some(old, _MOST), some(new, _MOST))]
     counts = np.empty((len(of), 2))
-    agree(*ends, _going_round(old), _going_round(new), of, (_NEAR, _TURNED, _GROWTH), counts)
+    turned = max(_TURNED, *(_SPACED * abs(each.angle_increment) for each in (before, scan)))
+    agree(*ends, _going_round(old), _going_round(new), of, (_NEAR, turned, _GROWTH), counts)
     seen = counts.sum(axis=1)
     return np.asarray(np.where(seen >= _FEWEST, counts[:, 0] / np.maximum(seen, 1.0), np.nan))
 

@@ -28,6 +28,11 @@ REMEMBERED = 30
 _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 #: The same where it goes on as it did: robots turn at once.
 _CONTINUED = (0.3, 0.3)
+#: Without odometry, errors from scan to scan add up to so much where little shows how far it goes,
+#: until more is seen [m, m, rad].
+_ADDED_UP = np.diag((0.2, 0.2, 0.0)) ** 2
+#: A scan comes soon after the last one if its motion is known so well [m].
+_SOON = 0.1
 #: A robot is not thought to go on faster [m/s, rad/s]; longest time from scan to scan [s].
 _FAST, _SLOWEST = 1.2, 3.0
 #: It is expected to go on as in so long [s]: by one step of a fast scanner it would be by noise.
@@ -125,8 +130,9 @@ class Drive(InTurn):
         by = self._by_odometry(odometry) if has_odometry else None
         if self.frames:
             prior, spread = self._expected(scan.stamp, odometry)
+            wide = spread if has_odometry else np.maximum(spread, _ADDED_UP)
             motion, by_beams, is_lost, self._evidence = self._around.place(
-                scan, features, prior, spread
+                scan, features, prior, wide, math.sqrt(spread[0, 0]) < _SOON
             )
             self._lasted += self._since(scan.stamp)
             self._spread = self._spread + spread if by is None else _errors_of(by, *_ODOMETRY)
@@ -136,7 +142,7 @@ class Drive(InTurn):
                 self._spread = by_beams
             way, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
             is_key = way >= SPACING or turn >= TURN or is_lost
-            self._go_on(scan.stamp, motion.pose, spread, by_beams)
+            self._go_on(scan.stamp, motion.pose, wide, by_beams)
         if is_key:
             off = np.zeros(3) if by is None else np.subtract(motion.pose, by)
             off[2] = wrapped(off[2])
