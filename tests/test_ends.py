@@ -5,6 +5,7 @@ import io
 import os
 import re
 import runpy
+import shlex
 import shutil
 import signal
 import subprocess
@@ -294,8 +295,10 @@ def test_a_standard_error_that_ends_stops_nothing(command, work, monkeypatch):
 
 
 @posix
+@pytest.mark.parametrize("buffers", ["", "1"])
 @pytest.mark.parametrize("end", ["full", "pipe"])
-def test_a_real_standard_output_that_ends(end):
+def test_a_real_standard_output_that_ends(end, buffers):
+    """Python that buffers what it writes flushes it when it ends, and complains by itself."""
     if end == "full":
         if not Path("/dev/full").exists():
             pytest.skip("no such device here")
@@ -304,10 +307,18 @@ def test_a_real_standard_output_that_ends(end):
         read, output = os.pipe()
         os.close(read)
     command = [sys.executable, "-m", "lineament", "methods"]
-    done = subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True)
+    env = {**os.environ, "PYTHONUNBUFFERED": buffers}
+    done = subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True, env=env)
     os.close(output)
     reason = os.strerror(errno.ENOSPC if end == "full" else errno.EPIPE)
     assert (done.returncode, done.stderr) == (1, f"lineament: standard output: {reason}\n")
+
+
+@posix
+def test_without_a_standard_output_nothing_is_wrong():
+    closed = f"{shlex.quote(sys.executable)} -m lineament methods >&-"
+    done = subprocess.run(closed, shell=True, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @posix

@@ -102,7 +102,14 @@ def main(arguments: list[str] | None = None) -> None:
 
     3 if nothing was found, 130 or 143 if it is stopped, by SIGINT (Ctrl-C) or SIGTERM.
     """
-    sys.exit(run(arguments))
+    status = run(arguments)
+    try:
+        print(end="", flush=True)  # There may be no standard output.
+    except OSError as error:
+        status = status or _unwritten(None, error.strerror)
+        # When Python ends it writes once more what is left: a message, and another status.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(status)
 
 
 def run(arguments: list[str] | None = None) -> int:
