@@ -13,9 +13,9 @@ from .local_map import some
 #: Errors of a motion from scan to scan, and their growth with way and turn [m, rad]: beams end so
 #: near to those of the other scan, and beside some of them that are turned by so much.
 _NEAR, _TURNED, _GROWTH = 0.08, 0.015, 0.1
-#: An end lies between two beams, so those beside it are as far as their spacing, and a little more.
-#: The farther one of both alone seems to look through a wall along a corridor, unless the scans are
-#: of one place, where beams lie on each other: then a robot that drives is thought to stand.
+#: An end lies between two beams, so the window around it is a little wider than beams are apart.
+#: The farther of the two alone seems to look through a wall along a corridor, unless both scans are
+#: of one place: a robot that drives would seem to stand.
 _SPACED = 1.01
 #: Two scans of one place explain at least this share of the ends that both of them can see: people,
 #: doors and glass take up to 8 % of them from scan to scan, a place elsewhere most.
