@@ -21,7 +21,6 @@ from lineament.logs import open_log
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.chain import loosened, spread_of, unseen
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.joining import count_of
 from lineament.mapping.parts import between
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, World
@@ -120,9 +119,8 @@ def off_and_claimed(seed, rate, doors):
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
     motions = [frame.motion.pose for frame in frames[1:]]
     chain = edges_of(pairs, motions, [spread_of(frame) for frame in frames[1:]])
-    poses, count = np.array([frame.pose for frame in frames]), count_of(sights)
-    found = optimise(poses, chain, sights, count)
-    known = optimise(found.poses, loosened(chain, unseen(frames)), sights, count, rounds=0)
+    found = optimise(np.array([frame.pose for frame in frames]), chain, sights)
+    known = optimise(found.poses, loosened(chain, unseen(frames)), sights, rounds=0)
     first, last = ((tuple(found.poses[k]), truth[frames[k].index]) for k in (0, -1))
     came, true = (relative(*of) for of in zip(first, last, strict=True))
     ends = np.array([(0, len(frames) - 1)])

@@ -102,7 +102,7 @@ def test_walls_have_the_covariance_that_they_scatter_by():
         poses = POSES + np.random.default_rng([seed, 1]).normal(0, 0.02, POSES.shape)
         poses[0] = POSES[0]
         sights = sights_of_a_square(seed, 0.01, POSES)
-        lines = optimise(poses, LOOSE, sights, 8).with_poses(sights)
+        lines = optimise(poses, LOOSE, sights).with_poses(sights)
         off = (lines["centroid"] * normals).sum(axis=1) + 4
         e = np.column_stack((off, wrapped(lines["angle"] - true_angle)))
         found.append(np.einsum("ni,nij,nj->n", e, np.linalg.inv(lines["covariance"]), e) / 2)
@@ -126,7 +126,7 @@ def test_a_wall_whose_sights_contradict_each_other_is_less_sure():
     sights["centroid"][:, 1] = np.array((-1, 1, -2, 2)) * 0.01
     sights["covariance"] = np.eye(2) * 0.01**2
     held = edges(poses, [(0, 1)], sigma=1e-6)
-    lines = optimise(poses, held, sights, 2).with_poses(sights)
+    lines = optimise(poses, held, sights).with_poses(sights)
     # χ² of 2 and 8 with two degrees of freedom.
     half = np.eye(2) * 0.01**2 / 2
     np.testing.assert_allclose(lines["covariance"], [half, 4 * half], rtol=1e-4, atol=1e-9)
@@ -134,7 +134,7 @@ def test_a_wall_whose_sights_contradict_each_other_is_less_sure():
 
 def test_dense_and_sparse_equations_are_the_same(monkeypatch):
     sights = sights_of_a_square(1, 0.01, POSES)
-    a, b = (optimise(POSES, LOOSE, sights, 8, dense=dense) for dense in (False, True))
+    a, b = (optimise(POSES, LOOSE, sights, dense=dense) for dense in (False, True))
     np.testing.assert_allclose(a.poses, b.poses, atol=1e-9)
     np.testing.assert_allclose(a.lines["centroid"], b.lines["centroid"], atol=1e-9)
     np.testing.assert_allclose(a.matrix.toarray(), b.matrix, rtol=1e-6, atol=1e-3)
@@ -193,7 +193,7 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
         for seed in range(6):
             sights = sights_of_a_square(seed, 0.005, POSES, rough)
             sights["covariance"] += 0.01**2 * np.diag((1, 1))  # as surfaces are thought to be
-            result = optimise(POSES, LOOSE, sights, 8)
+            result = optimise(POSES, LOOSE, sights)
             found.append(roughness(sights, result.poses, 0.01))
         assert 0.75 * rough <= np.mean(found) <= 1.1 * rough + 1e-3
         # Parts that are apart are two walls: nobody has seen what is between them.

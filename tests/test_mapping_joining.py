@@ -52,7 +52,6 @@ def test_what_follows_a_lost_key_frame_goes_where_enough_places_agree(
         return {q: SimpleNamespace(pose=pose, covariance=sure) for q, pose in found.items()}
 
     monkeypatch.setattr(joining, "_located", located)
-    monkeypatch.setattr(joining, "count_of", len)
     found = joined(frames, optimise(poses, chain), chain, np.zeros(0, SIGHT))
     left = found.poses[:, 1]
     np.testing.assert_allclose(left[:6], 0.0, atol=0.1)

@@ -12,6 +12,7 @@ import pytest
 SETTINGS = {
     "adjust": {"_KERNEL": 3.0, "_WIDE": 256.0, "_WIDER": 4, "_ROUNDS": 4, "_SMALL": 1e-4,
                "_HELD": 1e11, "_BATCH": 200, "_DENSE": 6000},
+    "again": {"APART": 0.015, "_KNOWN": 0.1, "_NEAR": 1.0, "_ROUNDS": 3},
     "around": {"ROUGHNESS": 0.01, "_MILD": -0.8, "_PASSED": 0.5, "_ROUNDS": 4, "_SURE": 0.75,
                "_SURER": 0.97, "_STEPS": 3, "_FARTHEST": 5.0, "_BEAMS": 120,
                "_SIFTED": ((12, 150), (40, 32)), "_WIDE": 0.12, "_FINAL": 0.07, "_TIGHT": 0.04,
@@ -42,7 +43,7 @@ SETTINGS = {
               "_NEAR": 2.0, "_FARTHEST": 25.0, "_SCANS": 6,
               "FLOOR": np.diag((0.02, 0.02, 0.005)) ** 2},
     "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05,
-               "APART": 0.015, "VIEWS": 3},
+               "VIEWS": 3},
     "placing": {"PLACES": 3.0, "_AGREE": (0.5, 0.05), "_OFF": 3.0, "_NEAR": (0.2, 0.05),
                 "_LOOK_THROUGH": 0.4, "FEWEST": 3, "_MORE": 3},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},

@@ -125,7 +125,7 @@ def test_parts_lie_beside_each_other_and_have_walls_of_their_own():
     sights = np.zeros(16, SIGHT)  # one wall along the way, which both parts see
     sights["frame"], sights["ends"] = np.arange(16), (-2.0, 2.0)
     sights["centroid"], sights["covariance"] = (0.0, 1.0), np.eye(2) * 1e-4
-    found = optimise(poses, edges, sights, 1)
+    found = optimise(poses, edges, sights)
     parts = parts_of(found, edges, np.zeros(16, bool))
     assert parts.count == 2
     moved, hung, of_parts = apart(found, edges, sights, parts)
@@ -137,7 +137,7 @@ def test_parts_lie_beside_each_other_and_have_walls_of_their_own():
     # No motion leads from one to the other, and what is left agrees with the poses.
     assert (parts.numbers[hung["ends"][:, 0]] == parts.numbers[hung["ends"][:, 1]]).all()
     np.testing.assert_allclose(errors_of_motions(hung, moved.poses)[0], 0.0, atol=1e-9)
-    again = optimise(moved.poses, hung, of_parts, 2, held=parts.roots)
+    again = optimise(moved.poses, hung, of_parts, held=parts.roots)
     np.testing.assert_allclose(again.poses, moved.poses, atol=1e-6)
 
 

@@ -14,6 +14,7 @@ from ..walls.sights import (
     SIGHT,
     WHOLE,
     bowed,
+    count_of,
     errors,
     lines_of,
     move,
@@ -106,13 +107,12 @@ def optimise(
     poses: Array,
     edges: Records,
     sights: Records | None = None,
-    count: int = 0,
     *,
     held: int | Numbers = 0,
     rounds: int = _ROUNDS,
     dense: bool = False,
 ) -> Adjusted:
-    """Adjust poses (n, 3) and the lines of `count` walls by Gauss-Newton; some poses are held.
+    """Adjust poses (n, 3) and the lines of walls by Gauss-Newton; some poses are held.
 
     Sights beyond 3 deviations count less. Loops have a weight of k⁴ / (k² + e²)², with e² their
     square (Geman and McClure), which is 1 where they are right and 0 where they are wrong; k comes
@@ -121,8 +121,9 @@ def optimise(
     is how they are known.
     """
     sights = np.zeros(0, SIGHT) if sights is None else sights
-    state, n, lines = poses.copy(), len(poses), lines_of(sights, poses, count)
-    information, (a, b) = np.linalg.inv(sights["covariance"]), edges["ends"].T
+    state, n, count = poses.copy(), len(poses), count_of(sights)
+    lines, (a, b) = lines_of(sights, poses, count), edges["ends"].T
+    information = np.linalg.inv(sights["covariance"])
     w, frames, every, here = sights["wall"], sights["frame"], np.arange(count), np.atleast_1d(held)
     kernel = _KERNEL * (_WIDE if edges["loop"].any() else 1.0)
     for _ in range(max(rounds, 1) + _WIDER * (kernel > _KERNEL)):
@@ -176,7 +177,7 @@ def adjust(
     names, sights["wall"] = np.unique(sights["wall"], return_inverse=True)
     m, pairs = len(names), [(k, k + 1) for k in range(n - 1)]
     chain = edges_of(pairs, [motion for motion, _ in motions], [spread for _, spread in motions])
-    found = optimise(np.array(poses), chain, sights, m, held=n - 1, rounds=3, dense=True)
+    found = optimise(np.array(poses), chain, sights, held=n - 1, rounds=3, dense=True)
     inverse, every = _inverse(found.matrix), np.arange(m)
     walls = bowed(walls_along(sights, found.poses, found.lines, WHOLE), sights)
     covariance = (found.gain.T @ inverse @ found.gain).reshape(m, 2, m, 2)

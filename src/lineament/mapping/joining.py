@@ -42,7 +42,7 @@ def closed(
         known = partial(between, found.poses, solve=found.solver()) if k else None
         near = Survey(frames, found.poses, sights, found.lines).loops(spread, known, track)
         if len(near):
-            found = optimise(found.poses, np.append(chain, near), sights, count_of(sights))
+            found = optimise(found.poses, np.append(chain, near), sights)
             right = found.weights[len(chain) :] > 0.5
             loops, refused = near[right], near[~right]
     return found, loops, refused
@@ -76,7 +76,7 @@ def joined(
                 poses = found.poses.copy()
                 poses[moved] = [compose(move, survey.pose(k)) for k in moved.tolist()]
                 edges = np.append(edges, _ties(survey, {q: places[q] for q in chosen}, rest))
-                found = optimise(poses, edges, sights, count_of(sights))
+                found = optimise(poses, edges, sights)
                 spans.remove((first, last))
     return found
 
@@ -119,8 +119,3 @@ def _ties(survey: Survey, places: dict[int, Location], others: Numbers) -> Recor
         motions.append(relative(survey.pose(ends[-1][0]), where.pose))
     spreads = [where.covariance + FLOOR for where in places.values()]
     return edges_of(ends, motions, spreads, loop=True)
-
-
-def count_of(sights: Records) -> int:
-    """Return the number of walls that sights have."""
-    return int(sights["wall"].max()) + 1

@@ -13,15 +13,16 @@ from ..progress import Track, untracked
 from ..scan import Array, Pose
 from ..scan.poses import compose
 from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
-from ..walls.sights import errors, lines_of, merged, on_lines, sights_of
+from ..walls.sights import count_of, errors, lines_of, on_lines, sights_of
 from .adjust import Adjusted, edges_of, optimise
+from .again import tied
 from .believed import believed
 from .chain import TWICE, found_back, loosened, spread_of, unseen
 from .drive_map import KeyFrame
 from .gone import standing
 from .grids import GRID_ENDINGS
 from .index import MAPPED
-from .joining import closed, count_of
+from .joining import closed
 from .line_map import LineMap
 from .loops import Survey
 from .parts import Parts, apart, parts_of
@@ -30,8 +31,6 @@ from .parts import Parts, apart, parts_of
 _ROUGH = 0.01
 #: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
 _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
-#: Surfaces that are so much off a common line are one wall [m].
-APART = 0.015
 #: A wall was seen by so many key frames.
 VIEWS = 3
 #: Surfaces that lie so close, and along each other (10°), hide each other [m].
@@ -137,7 +136,7 @@ def make_map(
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
     spreads = [spread_of(frame) for frame in frames[1:]]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
-    found = optimise(poses, chain, sights, count_of(sights))
+    found = optimise(poses, chain, sights)
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
     found, loops, refused = closed(frames, chain, found, sights, track)
@@ -146,19 +145,22 @@ def make_map(
     weak["loop"] = False
     edges = np.append(chain, weak)
     if len(loops):
-        found = optimise(found.poses, edges, sights, count_of(sights), rounds=2)
+        found = optimise(found.poses, edges, sights, rounds=2)
     loose = loosened(edges, unknown)
     found = as_known(found, loose, sights)
     is_doubted = np.array([frame.is_lost or frame.is_contradicted for frame in frames])
     parts = parts_of(found, loose[: len(chain)], is_doubted)
     found, chain, sights = apart(found, chain, sights, parts)
+    survey = Survey(frames, found.poses, sights, found.lines)
     if len(loops):
-        sights = merged(sights, found.poses, found.lines, APART)
+        tight = loosened(np.append(chain, parts.within(loops)), unknown)
+        tight["loop"] = False
+        survey = tied(survey, tight, chain, parts.roots)
     # Misfits widen the covariances only here: from the start, they have right loops refused.
     bent = [(widened(segments), walls) for segments, walls in seen]
-    again = relabelled(sights_of(bent, rough), sights)
-    sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
-    found = optimise(found.poses, chain, sights, count_of(sights), held=parts.roots, rounds=2)
+    again = relabelled(sights_of(bent, rough), survey.sights)
+    sights = relabelled(sights_of(bent, roughness(again, survey.poses, rough)), again)
+    found = optimise(survey.poses, chain, sights, held=parts.roots, rounds=2)
     found = as_known(found, loosened(chain, unknown), sights, parts.roots)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights, track))
     walls = walls_by_part(survey, parts)
@@ -171,7 +173,7 @@ def make_map(
 
 def as_known(found: Adjusted, edges: Records, sights: Records, held: int | Numbers = 0) -> Adjusted:
     """Return poses that were adjusted as is likely, and how they are known by looser edges."""
-    known = optimise(found.poses, edges, sights, count_of(sights), held=held, rounds=0)
+    known = optimise(found.poses, edges, sights, held=held, rounds=0)
     return replace(found, matrix=known.matrix)
 
 

@@ -52,6 +52,11 @@ class Parts:
         """Return the key frames of a part."""
         return np.flatnonzero(self.numbers == part)
 
+    def within(self, edges: Records) -> Records:
+        """Return the edges between key frames of one part."""
+        first, last = self.numbers[edges["ends"]].T
+        return np.asarray(edges[first == last])
+
     @property
     def is_sure(self) -> NDArray[np.bool_]:
         """Whether the pose of each key frame is sure, beside others of its part."""

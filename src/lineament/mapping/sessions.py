@@ -22,12 +22,13 @@ from ..walls import (
 )
 from ..walls.sights import joined, on_lines, sights_of, stretches
 from .adjust import Adjusted, edges_of, optimise
+from .again import APART
 from .chain import TWICE, loosened, unseen
 from .gone import along_lines, keys_of, looked_through, pieces_of, standing
 from .index import MAPPED
 from .line_map import LineMap
 from .loops import FLOOR, Survey
-from .making import APART, VIEWS, DriveMap, as_known, single
+from .making import VIEWS, DriveMap, as_known, single
 from .parts import beside, boxes_of
 from .placing import FEWEST, PLACES, Placement, is_enough, surely_on
 
@@ -183,8 +184,8 @@ def _adjusted(
     apart = np.setdiff1d(np.arange(parts.count), placed.located)
     poses = np.array([*(placed.poses[of.index] for of in placed.survey.frames), (0.0, 0.0, 0.0)])
     held = np.append(parts.roots[apart], n)
-    edges, count = np.append(placed.chain, ties), int(sights["wall"].max()) + 1
-    adjusted = optimise(poses, edges, sights, count, held=held)
+    edges = np.append(placed.chain, ties)
+    adjusted = optimise(poses, edges, sights, held=held)
     right, of_ties = adjusted.weights[-len(ties) :] > 0.5, parts.numbers[ties["ends"][:, 1]]
     for k in placed.located:
         if not is_enough(*(int((of_ties == k)[of].sum()) for of in (right, ~right))):
@@ -194,8 +195,7 @@ def _adjusted(
     edges = np.append(placed.chain, ties)
     for _ in range(_ROUNDS):
         sights, _ = joined(sights, APART, adjusted.poses)
-        count = int(sights["wall"].max()) + 1
-        adjusted = optimise(adjusted.poses, edges, sights, count, held=held, rounds=2)
+        adjusted = optimise(adjusted.poses, edges, sights, held=held, rounds=2)
     loose = loosened(edges, unseen(placed.survey.frames))
     return as_known(adjusted, loose, sights, held), sights
 

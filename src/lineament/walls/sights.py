@@ -1,7 +1,7 @@
 """Sights: the segments that show walls, the lines that they lie on, and which of these are one."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import chain
 
 import numpy as np
@@ -66,6 +66,11 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     noise = np.maximum(segments["rms"] ** 2 - sights["misfit"], 0.0)
     sights["noise"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
     return sights[segments["length"] > SHORT]
+
+
+def count_of(sights: Records) -> int:
+    """Return the number of walls that sights have."""
+    return int(sights["wall"].max(initial=-1)) + 1
 
 
 def placed(sights: Records, poses: Array) -> tuple[Array, Array]:
@@ -175,11 +180,31 @@ def on_lines(lines: Records, w: Numbers, begin: Array, end: Array, views: Number
 
 
 def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Records:
-    """Return the sights with a number for each wall that is the same for those that are one.
+    """Return the sights with one number for those walls that are the `same`."""
+    return renumbered(sights, same(sights, poses, lines, apart))
+
+
+def renumbered(sights: Records, pairs: Numbers) -> Records:
+    """Return the sights with new numbers of walls, of which pairs (m, 2) are one."""
+    labels, result = np.arange(count_of(sights)), sights.copy()
+    labels[pairs[:, 0]] = pairs[:, 1]
+    result["wall"] = np.unique(labels, return_inverse=True)[1][sights["wall"]]
+    return result
+
+
+def same(
+    sights: Records,
+    poses: Array,
+    lines: Records,
+    apart: float,
+    denied: Collection[tuple[int, int]] = (),
+) -> Numbers:
+    """Return pairs of walls (m, 2) that are one: a part, and the wall that it is a part of.
 
     They are one if they face the same way, lie along each other or no farther apart than a gap,
     and the χ² of their common line is within its 99 % quantile; surfaces are off it by their
-    misfits and `apart` [m]. The most often seen come first, and of these the longest.
+    misfits and `apart` [m]. The most often seen come first, and of these the longest. Some pairs
+    are `denied`.
     """
     count, w, points = len(lines), sights["wall"], lines["centroid"]
     first, last = np.full(count, 1e9), np.full(count, -1e9)
@@ -188,9 +213,9 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     np.maximum.at(last, w, high)
     views = np.bincount(w, minlength=count)
     bows = misfits(sights, count) + apart**2 / 2
-    order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
+    order, u = np.lexsort((first - last, -views)), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
-    kept = np.zeros(count, dtype=bool)
+    kept, found = np.zeros(count, dtype=bool), []
     # Twice around, so that those of nearly the same angle follow each other.
     ranked = np.tile(np.argsort(lines["angle"]), 2)
     turned = lines["angle"][ranked] + np.repeat((0.0, 2 * math.pi), count)
@@ -216,11 +241,12 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
         shorter = np.minimum(last[near] - first[near], last[k] - first[k])
         spread += bent(bows[near] + bows[k], shorter)
         squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
-        if squares.min() < _GATE:
-            labels[k], kept[k] = near[squares.argmin()], False
-    result = sights.copy()
-    result["wall"] = np.unique(labels, return_inverse=True)[1][w]
-    return result
+        likely = near[np.argsort(squares)[: (squares < _GATE).sum()]].tolist()
+        one = next(((k, j) for j in likely if (k, j) not in denied), None)
+        if one:
+            found.append(one)
+            kept[k] = False
+    return np.array(found, np.int64).reshape(-1, 2)
 
 
 def misfits(sights: Records, count: int) -> Array:
@@ -241,7 +267,7 @@ def joined(sights: Records, apart: float = 0.0, poses: Array = _HERE) -> tuple[R
     There is at least one sight; without poses, they are in the frame of the walls.
     """
     before = -1
-    while (count := int(sights["wall"].max()) + 1) != before:
+    while (count := count_of(sights)) != before:
         lines, before = lines_of(sights, poses, count), count
         sights = merged(sights, poses, lines, apart)
     return sights, lines
