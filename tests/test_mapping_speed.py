@@ -1,6 +1,7 @@
 """Bare corridors without odometry: what beams alone leave open, and how far speeds carry."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from lineament import Extractor, LaserScan
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise
-from lineament.mapping.chain import loosened, unseen
+from lineament.mapping.chain import loosened, slid, unseen
 from lineament.mapping.drive_map import Drive, KeyFrame
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import between
@@ -54,6 +55,31 @@ def along(frames):
     found = unseen(frames)
     assert not found[:, 1:].any()
     return found[:, 0, 0]
+
+
+SHOWN = np.diag((0.25, 0.05, 0.02)) ** 2
+
+
+@pytest.mark.parametrize(
+    ("stretch", "doubted"),
+    [
+        ("s o o L s", "1 2"),
+        ("s o b o L", "1 3"),  # one whose way beams show is not doubted, but those before are
+        ("s o s o L", "3"),  # in between the way is seen
+        ("s o o s L", ""),
+        ("s o L o s", "1"),
+        ("o O L s", "0"),  # lost itself, which is not sure anyway
+        ("s o o s s", ""),
+        ("b b L", ""),
+    ],
+)
+def test_a_bare_stretch_at_whose_end_the_robot_is_lost_is_doubted(stretch, doubted):
+    """Seen, open or shown by beams, and lost (open or not)."""
+    frames = []
+    for k, kind in enumerate(stretch.split()):
+        frame = replace(key(k, 1.0, 1.0, is_bare=kind in "obO"), is_lost=kind in "LO")
+        frames.append(replace(frame, beams_alone=SHOWN) if kind == "b" else frame)
+    assert np.flatnonzero(slid(frames)).tolist() == [int(k) for k in doubted.split()]
 
 
 def test_what_is_not_known_grows_with_the_time_since_the_speed_was_seen():

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..motion.estimate import Motion
 from ..scan import Array, Pose
@@ -11,6 +12,7 @@ from ..scan.poses import compose, inverse, relative
 from ..walls import Records
 from .around import open_ways
 from .drive_map import REMEMBERED, UNKNOWN, Drive, KeyFrame
+from .following import UNSURE
 
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
@@ -56,6 +58,21 @@ def unseen(frames: list[KeyFrame]) -> Array:
             by_beams = float(u @ frame.beams_alone[:2, :2] @ u)
             found[k, :2, :2] += min(by_speed, by_beams) * np.outer(u, u)
             since = since if by_speed < by_beams else 0.0
+    return found
+
+
+def slid(frames: list[KeyFrame]) -> NDArray[np.bool_]:
+    """Return whether the robot may be elsewhere along a bare stretch, of each key frame (n,).
+
+    It is lost at the end of the stretch, and beams alone leave open how far it went. What walls say
+    there proves nothing: who slides along a corridor takes walls for others.
+    """
+    found, is_lost = np.zeros(len(frames), bool), False
+    for k, frame in reversed(list(enumerate(frames))):
+        if frame.is_lost or frame.beams_alone is None:
+            is_lost = frame.is_lost
+        elif is_lost:
+            found[k] = np.linalg.eigvalsh(frame.beams_alone[:2, :2])[1] > UNSURE**2
     return found
 
 

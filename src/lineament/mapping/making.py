@@ -17,7 +17,7 @@ from ..walls.sights import count_of, errors, lines_of, on_lines, sights_of
 from .adjust import Adjusted, edges_of, optimise
 from .again import tied
 from .believed import believed
-from .chain import TWICE, found_back, loosened, spread_of, unseen
+from .chain import TWICE, found_back, loosened, slid, spread_of, unseen
 from .drive_map import KeyFrame
 from .gone import standing
 from .grids import GRID_ENDINGS
@@ -149,7 +149,7 @@ def make_map(
     loose = loosened(edges, unknown)
     found = as_known(found, loose, sights)
     is_doubted = np.array([frame.is_lost or frame.is_contradicted for frame in frames])
-    parts = parts_of(found, loose[: len(chain)], is_doubted)
+    parts = parts_of(found, loose[: len(chain)], is_doubted | slid(frames))
     found, chain, sights = apart(found, chain, sights, parts)
     survey = Survey(frames, found.poses, sights, found.lines)
     if len(loops):
