@@ -7,7 +7,7 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context, popen_spawn_posix, resource_tracker
 from multiprocessing.connection import Connection
 from threading import Event
 from typing import Any
@@ -16,6 +16,9 @@ from ...errors import LineamentError, needed_by
 from .manifest import Row
 from .parts import Report, Task, extract_part, failed
 
+#: What starts a process is imported here, not by the threads that start them: a tool that takes
+#: modules out of `sys.modules` meanwhile, as coverage does, would have their logs fail.
+_STARTS = popen_spawn_posix
 #: Seconds between two looks at whether to stop, and until a process is killed.
 _PERIOD, _PATIENCE = 0.2, 3.0
 #: Seconds to wait for a Dask scheduler.
