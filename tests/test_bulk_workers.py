@@ -263,3 +263,20 @@ def outcomes_so_far(folder):
         return outcomes(folder).values()
     except (OSError, ValueError):  # not there yet, or in the middle of a line
         return ()
+
+
+def test_a_process_is_started_without_an_import(tmp_path):
+    """A tool that takes modules out of `sys.modules` meanwhile would have the log fail."""
+    script = tmp_path / "starts.py"
+    script.write_text(
+        "import sys\n"
+        "from lineament.tasks.bulk import workers\n"
+        "if __name__ == '__main__':\n"
+        "    before = set(sys.modules)\n"
+        "    worker = workers._Worker()\n"
+        "    print(sorted(set(sys.modules) - before))\n"
+        "    worker.end()\n",
+        encoding="utf-8",
+    )
+    found = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert found.stdout == "[]\n"
