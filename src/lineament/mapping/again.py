@@ -1,10 +1,11 @@
 """Walls that are seen again: which of them are one, as far as the places are known."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..scan import Array
 from ..scan.poses import relative
@@ -17,7 +18,7 @@ from .parts import between
 
 #: Surfaces that are so much off a common line are one wall [m].
 APART = 0.015
-#: Walls are one only if the places that they are seen from are known to each other so well [m].
+#: Walls are one only if the places that they are seen from are known so well across them [m].
 #: Where poses are off by more, another surface lies there: the other side of a recess, a wall of
 #: the next room on nearly the same line.
 _KNOWN = 0.1
@@ -36,34 +37,31 @@ def tied(survey: Survey, edges: Records, chain: Records, held: Numbers) -> Surve
     `edges` are all that is known of the poses beside the walls, loops included; `chain` what they
     are adjusted by, of which some are held.
     """
-    known: set[Pair] = set()
     for _ in range(_ROUNDS):
         graph = optimise(survey.poses, edges, survey.sights, held=held, rounds=0)
-        sights = renumbered(survey.sights, _one(survey, graph, known))
+        sights = renumbered(survey.sights, _one(survey, graph))
         found = optimise(survey.poses, chain, sights, held=held, rounds=2)
         survey = Survey(survey.frames, found.poses, sights, found.lines)
     return survey
 
 
-def _one(survey: Survey, graph: Adjusted, known: set[Pair]) -> Numbers:
-    """Return pairs of walls (m, 2) that are the `same`, and are seen from known places.
-
-    Pairs of key frames that know where the other is are added to those that are known already.
-    """
+def _one(survey: Survey, graph: Adjusted) -> Numbers:
+    """Return pairs of walls (m, 2) that are the `same`, and are seen from known places."""
     sights, solve = survey.sights, graph.solver()
-    nearest, wrong = dict[Pair, Pair](), set[Pair]()
+    right, wrong = set[Pair](), set[Pair]()
     order = np.argsort(sights["wall"], kind="stable")
     begins = np.searchsorted(sights["wall"][order], np.arange(1, count_of(sights)))
     seen_from = [np.unique(of) for of in np.split(sights["frame"][order], begins)]
     while True:
         pairs = same(sights, survey.poses, graph.lines, APART, wrong)
-        new = [(k, j) for k, j in pairs.tolist() if (k, j) not in nearest]
-        nearest |= {(k, j): _nearest(survey.poses, seen_from[k], seen_from[j]) for k, j in new}
-        known.update(_knowing(survey, solve, {nearest[pair] for pair in new} - known))
-        unknown = {pair for pair in new if nearest[pair] not in known}
-        if not unknown:
+        new = [(k, j) for k, j in pairs.tolist() if (k, j) not in right]
+        nearest = [_nearest(survey.poses, seen_from[k], seen_from[j]) for k, j in new]
+        angles = graph.lines["angle"][[j for _, j in new]]
+        known = _known(survey, solve, nearest, angles)
+        if known.all():
             return pairs
-        wrong |= unknown
+        right.update(compress(new, known))
+        wrong.update(compress(new, ~known))
 
 
 def _nearest(poses: Array, some: Numbers, others: Numbers) -> Pair:
@@ -74,18 +72,19 @@ def _nearest(poses: Array, some: Numbers, others: Numbers) -> Pair:
     return first, last
 
 
-def _knowing(
-    survey: Survey, solve: Callable[[Array], Array], asked: Iterable[Pair]
-) -> Iterator[Pair]:
-    """Return those pairs of key frames of which each knows where the other is."""
-    frames, rest = survey.frames, list[Pair]()
-    for a, b in sorted(asked):
+def _known(
+    survey: Survey, solve: Callable[[Array], Array], nearest: list[Pair], angles: Array
+) -> NDArray[np.bool_]:
+    """Return whether two key frames each know where the other is, across a wall at an angle."""
+    frames, known = survey.frames, np.zeros(len(nearest), bool)
+    for k, (a, b) in enumerate(nearest):
         motion = relative(survey.pose(a), survey.pose(b))
         is_near = math.hypot(*motion[:2]) < _NEAR
-        if a == b or (is_near and agreement(frames[a].scan, frames[b].scan, [motion])[0] >= LEAST):
-            yield a, b
-        else:
-            rest.append((a, b))
-    pairs = np.array(rest, np.int64).reshape(-1, 2)
+        agree = is_near and agreement(frames[a].scan, frames[b].scan, [motion])[0] >= LEAST
+        known[k] = a == b or agree
+    pairs = np.array(nearest, np.int64).reshape(-1, 2)[~known]
     spreads = between(survey.poses, pairs, solve)[:, :2, :2]
-    yield from compress(rest, np.linalg.eigvalsh(spreads)[:, 1] < _KNOWN**2)
+    across = angles[~known] - survey.poses[pairs[:, 0], 2]
+    normals = np.column_stack((-np.sin(across), np.cos(across)))
+    known[~known] = np.einsum("ni,nij,nj->n", normals, spreads, normals) < _KNOWN**2
+    return known
