@@ -3,7 +3,8 @@
 Each log is mapped with its corrected poses as odometry; local maps of 5 m of way, one each 1.3 m,
 are looked for without a guess on the map of the whole log, on that of its even scans alone, and on
 the map of another log, which shows another building. A place is right within 0.3 m and 3° of where
-the log's poses put it beside the nearest scan of the map: parts of a map may show the same rooms.
+the log's poses put it beside a scan of the map: that which was taken then, or the nearest, as parts
+of a map may show the same rooms.
 ``--fit`` counts instead what `lineament.mapping.evidence` has of maps, by the first halves of three
 logs.
 """
@@ -55,41 +56,44 @@ class Place(NamedTuple):
 
     query: Query
     pose: Pose
+    scan: int
 
 
 class Mapped(NamedTuple):
-    """A map, and the poses of its scans: on it, and by its log."""
+    """A map of every so many scans of a log, and their poses: on it, and by the log."""
 
     plan: LineMap
     poses: list[Pose]
     logged: list[Pose]
+    every: int
 
-    def expected(self, logged: Pose, found: Pose) -> Pose:
-        """Return where a pose of the log is on the map, beside the scan nearest to one found.
+    def expected(self, place: Place, found: Pose) -> list[Pose]:
+        """Return where a place is on the map beside its scan, and beside the nearest to one found.
 
-        A map may show the same rooms twice, in two parts or where a loop is not closed.
+        A map may show the same rooms twice, in two parts or where a loop is not closed; passes of
+        a log through the same rooms are off by up to a metre.
         """
-        k = nearest(self.poses, found)
-        return compose(self.poses[k], relative(self.logged[k], logged))
+        beside = min(place.scan // self.every, len(self.poses) - 1), nearest(self.poses, found)
+        return [compose(self.poses[k], relative(self.logged[k], place.pose)) for k in beside]
 
 
 def nearest(poses: list[Pose], to: Pose) -> int:
     return int(np.hypot(*(np.array(poses)[:, :2] - to[:2]).T).argmin())
 
 
-def mapped(scans: list[ln.LaserScan]) -> Mapped:
-    drive, extract = Drive(), ln.Extractor()
+def mapped(scans: list[ln.LaserScan], every: int = 1) -> Mapped:
+    drive, extract, scans = Drive(), ln.Extractor(), scans[::every]
     for scan in scans:
         drive.add(scan, extract(scan), scan.pose)
     made = make_map(drive.frames, drive.scans)
-    return Mapped(made.map, made.poses, [scan.pose for scan in scans])
+    return Mapped(made.map, made.poses, [scan.pose for scan in scans], every)
 
 
 def surveyed(scans: list[ln.LaserScan]) -> tuple[Mapped, Mapped, list[Place]]:
     """Return the maps of a whole log and of its even scans, and its places."""
     extract, found, since, last = ln.Extractor(), [], 0.0, scans[0].pose
     tracker, local = ln.Tracker(), LocalMap(WAY)
-    for scan in scans:
+    for k, scan in enumerate(scans):
         way = math.dist(scan.pose[:2], last[:2])
         if way > GAP:
             tracker, local, since = ln.Tracker(), LocalMap(WAY), 0.0
@@ -98,16 +102,16 @@ def surveyed(scans: list[ln.LaserScan]) -> tuple[Mapped, Mapped, list[Place]]:
         since, last = since + min(way, GAP), scan.pose
         if since > STEP and local.way_seen > 2.0:
             since = 0.0
-            found.append(Place(local.query(), scan.pose))
-    return mapped(scans), mapped(scans[::2]), found
+            found.append(Place(local.query(), scan.pose, k))
+    return mapped(scans), mapped(scans, 2), found
 
 
 def looked_for(place: Place, on: Mapped) -> tuple[float, ...]:
     """Return the verdict, whether the best pose is right, and the shares of the beams there."""
     where = locate(place.query, on.plan)
-    x, y, turn = relative(on.expected(place.pose, where.pose), where.pose)
+    off = [relative(pose, where.pose) for pose in on.expected(place, where.pose)]
+    right = any(math.hypot(x, y) < RIGHT[0] and abs(turn) < RIGHT[1] for x, y, turn in off)
     of = where.evidence
-    right = math.hypot(x, y) < RIGHT[0] and abs(turn) < RIGHT[1]
     return VERDICTS.index(where.verdict), right, of.explained, of.short, of.contradicted
 
 
