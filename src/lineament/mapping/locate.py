@@ -10,7 +10,7 @@ from ..features import Features
 from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import checked_pose, covariance_of_pose
-from ..walls import lengths_of, unit, wrapped
+from ..walls import wrapped
 from .evidence import ON_DRAWING, Evidence, evidence_of, on_map, over_chance
 from .hypotheses import BOX, TURN, agreement, hypotheses, image_of, spectrum
 from .line_map import LineMap
@@ -27,10 +27,10 @@ LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
 
 #: Poses that are tried by few beams, refined, and judged by all beams; on a map, those with the
 #: most votes are refined in any case.
-TRIED, SIFTED, REFINED, JUDGED, VOTED = 800, 60, 24, 12, 16
+TRIED, SIFTED, REFINED, JUDGED, VOTED = 800, 60, 24, 20, 16
 _FEWEST_BEAMS, _FEW_BEAMS = 12, 40
-#: The best is compared with poses so far off [m].
-_SLIDES = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
+#: The best is compared with poses so far off along what it is known least [m].
+_SLIDES = np.kron((0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (-1.0, 1.0))
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
 _NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance: that of a wrong
@@ -253,17 +253,15 @@ def _searched(
     tried = np.concatenate((tried, voted))
     # What is near enough may be moved away by a wrong pair of walls that is looked for far off.
     starts = np.concatenate((tried, refined(tried, query, plan.index, COARSE)[0]))
-    poses, _, _ = refined(starts, query, plan.index, FINE)
+    poses, _, information = refined(starts, query, plan.index, FINE)
     found = evidence_of(poses, query.beams, plan.index, _TIGHT, tight, apart=apart)
-    # Poses some way off along both axes of the local map may look alike.
-    best = poses[found[:, 0].argmax()]
-    main = np.angle((lengths_of(query.walls) * np.exp(4j * query.walls["angle"])).sum()) / 4
-    slid = np.tile(best, (2 * len(_SLIDES), 1))
-    axes = unit(best[2] + main + np.array((0.0, math.pi / 2)))
-    slid[:, :2] += np.kron(axes.T, _SLIDES).T
+    # Along a corridor, poses some way off may be nearly as likely.
+    best = found[:, 0].argmax()
+    covariance = np.linalg.inv(information[best] + WEAK)
+    slid = np.tile(poses[best], (len(_SLIDES), 1))
+    slid[:, :2] += np.outer(_SLIDES, np.linalg.eigh(covariance[:2, :2])[1][:, 1])
     slid, _, _ = refined(slid, query, plan.index, FINE)
-    best_odds = found[:, 0].max()
-    limits = {"best": best_odds, "apart": apart}
+    limits = {"best": found[best, 0], "apart": apart}
     of_slid = evidence_of(slid, query.beams, plan.index, _TIGHT, tight, **limits)
     found = np.concatenate((found, of_slid))
     poses = np.concatenate((poses, slid))
