@@ -64,12 +64,22 @@ def test_a_loop_closes_the_ring_and_a_wrong_one_has_no_weight(ring):
     wrong["motion"] += (3.0, -2.0, 1.0)
     found = optimise(start, np.concatenate((chain, right, wrong)))
     np.testing.assert_allclose(found.poses[0], start[0], atol=1e-8)
-    assert found.weights[:42].min() > 0.5
-    assert found.weights[42:].max() < 0.01
+    np.testing.assert_array_equal(found.right, np.arange(44) < 42)
     errors = np.hypot(*(found.poses - poses)[:, :2].T)
     assert errors.max() < 0.15 < np.hypot(*(start - poses)[:, :2].T).max()
     alone = optimise(start, np.append(chain, right))
     np.testing.assert_allclose(found.poses, alone.poses, atol=0.02)
+
+
+@pytest.mark.parametrize(("square", "is_right"), [(3.8, True), (11.3, True), (11.4, False)])
+def test_a_loop_is_right_as_far_as_99_of_100_right_ones_are(ring, square, is_right):
+    """The quantile of 99 % of χ² with three degrees of freedom is 11.345."""
+    poses, chain = ring
+    loop = edges(poses, [(3, 36)], 0.02, loop=True)
+    loop["motion"][0, 0] += math.sqrt(square / loop["information"][0, 0, 0])
+    found = optimise(poses, np.append(chain, loop), rounds=0)
+    assert found.right[-1] == is_right
+    assert found.right[:-1].all()
 
 
 def sights_of_a_square(seed, sigma, poses, rough=0.0):

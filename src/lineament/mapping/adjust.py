@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import needed_by
 from ..progress import Track, untracked
 from ..scan import Array, Pose
 from ..walls import Numbers, Records, summed, wrapped
 from ..walls.sights import (
+    GATE_3,
     SIGHT,
     WHOLE,
     bowed,
@@ -64,14 +66,14 @@ def errors_of_motions(edges: Records, poses: Array) -> tuple[Array, Array, Array
 
 @dataclass(slots=True, eq=False)
 class Adjusted:
-    """Poses (n, 3), lines of walls as if the poses were known, and the weight of each edge.
+    """Poses (n, 3), lines of walls as if the poses were known, and which edges are right.
 
     `gain` holds how the walls follow the poses; `matrix` is that of the equations of the poses.
     """
 
     poses: Array
     lines: Records
-    weights: Array
+    right: NDArray[np.bool_]
     gain: Any
     matrix: Any
 
@@ -116,9 +118,9 @@ def optimise(
 
     Sights beyond 3 deviations count less. Loops have a weight of k⁴ / (k² + e²)², with e² their
     square (Geman and McClure), which is 1 where they are right and 0 where they are wrong; k comes
-    down to 3 from round to round, so that at first none is left out. Walls are eliminated (Schur),
-    so that the equations are of the poses alone. Without rounds, the poses stay: what is returned
-    is how they are known.
+    down to 3 from round to round, so that at first none is left out. A loop is right if its square
+    is within the quantile of 99 % of χ². Walls are eliminated (Schur), so that the equations are of
+    the poses alone. Without rounds, the poses stay: what is returned is how they are known.
     """
     sights = np.zeros(0, SIGHT) if sights is None else sights
     state, n, count = poses.copy(), len(poses), count_of(sights)
@@ -158,7 +160,7 @@ def optimise(
         if kernel <= _KERNEL and max(abs(step).max(), abs(turn).max(initial=0)) < _SMALL:
             break
         kernel = max(kernel / 4, _KERNEL)
-    return Adjusted(state, lines, weights, gain, matrix)
+    return Adjusted(state, lines, ~edges["loop"] | (squares < GATE_3), gain, matrix)
 
 
 def adjust(

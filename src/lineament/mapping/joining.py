@@ -43,7 +43,7 @@ def closed(
         near = Survey(frames, found.poses, sights, found.lines).loops(spread, known, track)
         if len(near):
             found = optimise(found.poses, np.append(chain, near), sights)
-            right = found.weights[len(chain) :] > 0.5
+            right = found.right[len(chain) :]
             loops, refused = near[right], near[~right]
     return found, loops, refused
 

@@ -186,7 +186,7 @@ def _adjusted(
     held = np.append(parts.roots[apart], n)
     edges = np.append(placed.chain, ties)
     adjusted = optimise(poses, edges, sights, held=held)
-    right, of_ties = adjusted.weights[-len(ties) :] > 0.5, parts.numbers[ties["ends"][:, 1]]
+    right, of_ties = adjusted.right[-len(ties) :], parts.numbers[ties["ends"][:, 1]]
     for k in placed.located:
         if not is_enough(*(int((of_ties == k)[of].sum()) for of in (right, ~right))):
             raise NothingFoundError("places of the drive on the plan contradict each other")

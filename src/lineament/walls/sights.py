@@ -44,7 +44,7 @@ _SHARE = 0.2
 _TURN = 0.35
 #: Quantiles of 99 % of χ² with two degrees of freedom and with three: so many of the parts of a
 #: wall, and of a column, stay together.
-_GATE, _GATE_3 = -2.0 * math.log1p(-0.99), 11.344866730144371
+_GATE, GATE_3 = -2.0 * math.log1p(-0.99), 11.344866730144371
 #: Where sights are placed already.
 _HERE = np.zeros((1, 3))
 
@@ -295,10 +295,10 @@ def columns_shown(tables: Iterable[Records]) -> Records:
         # The χ² is at least the squared distance over the trace of the covariance.
         squares = np.square(places[:n] - place).sum(axis=1)
         spread = np.trace(arc["covariance"])
-        for k in np.flatnonzero(squares < _GATE_3 * (spreads[:n] + spread)).tolist():
+        for k in np.flatnonzero(squares < GATE_3 * (spreads[:n] + spread)).tolist():
             column, e = columns[k], place - places[k]
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
-            if e @ inverse @ e < _GATE_3:
+            if e @ inverse @ e < GATE_3:
                 gain = column["covariance"] @ inverse
                 column["center"] += (gain @ e)[:2]
                 column["radius"] += (gain @ e)[2]
