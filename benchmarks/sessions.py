@@ -25,7 +25,7 @@ from lineament.errors import NothingFoundError
 from lineament.logs import open_log
 from lineament.mapping import LineMap
 from lineament.mapping.making import DriveMap, make_map
-from lineament.mapping.sessions import merge_onto, placements
+from lineament.mapping.sessions import Merged, merge_onto, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, office
 from lineament.simulation.layouts import way_along
@@ -230,13 +230,13 @@ def simulated(first: int, buildings: int) -> None:
 
 def real(pictures: Path | None) -> None:
     """Print what becomes of the halves of real logs, each on the map of the other."""
-    print("\n| log | map, drive | verdict | ATE map | drive | both | doubled | walls |")
-    print("|---|---|---|--:|--:|--:|--:|--:|")
-    for name in ("Intel lab", "fr079"):
-        path = DATA / LOGS[name][0]
-        if not path.exists():
+    print("\n| log | map, drive | placed, of [m] | off (RMS, most) [m] ", end="")
+    print("| ATE map | drive | both [m] | doubled | walls [m] |")
+    print("|---|---|--:|--:|--:|--:|--:|--:|--:|")
+    for name, (log, _) in LOGS.items():
+        if not (DATA / log).exists():
             continue
-        scans = list(open_log(path))
+        scans = list(open_log(DATA / log))
         halves = []
         for half in (scans[: len(scans) // 2], scans[len(scans) // 2 :]):
             found = drive(half, odometry=False)
@@ -244,29 +244,39 @@ def real(pictures: Path | None) -> None:
             halves.append(Session(made, [scan.pose for scan in half], np.empty((0, 4))))
         for order, (old, new) in zip(("1, 2", "2, 1"), permutations(halves, 2), strict=True):
             found = merged(new, old.made.map)
-            part, of = old.made.parts.numbers[old.made.frame_of], new.made.parts
-            chosen = part == int(np.argmax(old.made.ways))
-            at, true = (list(np.array(of)[chosen]) for of in (old.made.poses, old.truth))
-            cells = [name, order, "refused", f"{ate(at, true):.3f} m"]
-            if found is not None:
-                is_in = np.isin(of.numbers[new.made.frame_of], found.made.located)
-                alone, both, truth = (
-                    list(np.array(poses)[is_in])
-                    for poses in (new.made.poses, found.made.poses, new.truth)
-                )
-                frame = alignment(at, true)
-                off = [relative(b, compose(frame, a)) for a, b in zip(both, truth, strict=True)]
-                rms = math.sqrt(np.square(np.array(off)[:, :2]).sum(axis=1).mean())
-                cells[2] = f"placed, off by {rms:.3f} m (RMS)"
-                parts = len(found.made.located)  # drawn beside each other: no common error
-                by_itself = f"{ate(alone, truth):.3f} m" if parts == 1 else f"in {parts} parts"
-                cells += [by_itself, f"{ate(at + both, true + truth):.3f} m"]
-                united = found.made.map
-                cells += [f"{doubled(united):.1f} m", f"{length(united):.0f} m"]
-                if pictures is not None:
-                    target = pictures / f"sessions_{path.stem.split('_')[0]}_{order[0]}.png"
-                    draw(target, old.made.map, new.made.map, united)
-            print("| " + " | ".join(cells) + " |", flush=True)
+            print("| " + " | ".join([name, order, *outcome(old, new, found)]) + " |", flush=True)
+            if found is not None and pictures is not None:
+                target = pictures / f"sessions_{log.split('/')[1].split('_')[0]}_{order[0]}.png"
+                draw(target, old.made.map, new.made.map, found.made.map)
+
+
+def outcome(old: Session, new: Session, found: Merged | None) -> list[str]:
+    """Return what becomes of a drive on the map of another, by the sure poses of both.
+
+    Errors are those beside the longest part of the map.
+    """
+    part, of = old.made.parts.numbers[old.made.frame_of], new.made.parts
+    chosen = (part == int(np.argmax(old.made.ways))) & old.made.parts.is_sure[old.made.frame_of]
+    at, true = (list(np.array(of)[chosen]) for of in (old.made.poses, old.truth))
+    if found is None:
+        return ["refused", "", f"{ate(at, true):.3f}"]
+    located = list(found.made.located)
+    is_in = np.isin(of.numbers[new.made.frame_of], located) & of.is_sure[new.made.frame_of]
+    alone, both, truth = (
+        list(np.array(poses)[is_in]) for poses in (new.made.poses, found.made.poses, new.truth)
+    )
+    frame, united = alignment(at, true), found.made.map
+    off = [relative(b, compose(frame, a)) for a, b in zip(both, truth, strict=True)]
+    away = np.hypot(*np.array(off)[:, :2].T)
+    # Parts that are drawn beside each other have no common error.
+    by_itself = f"{ate(alone, truth):.3f}" if len(located) == 1 else f"in {len(located)} parts"
+    ways = new.made.ways
+    return [
+        f"{sum(ways[k] for k in located):.0f} of {sum(ways):.0f}",
+        f"{math.sqrt((away**2).mean()):.3f}, {away.max():.2f}",
+        f"{ate(at, true):.3f}", by_itself, f"{ate(at + both, true + truth):.3f}",
+        f"{doubled(united):.1f}", f"{length(united):.0f}",
+    ]  # fmt: skip
 
 
 def ate(poses, truth) -> float:
