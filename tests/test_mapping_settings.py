@@ -46,7 +46,7 @@ SETTINGS = {
     "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05,
                "VIEWS": 3},
     "placing": {"PLACES": 3.0, "_AGREE": (0.5, 0.05), "_OFF": 3.0, "_NEAR": (0.2, 0.05),
-                "_LOOK_THROUGH": 0.4, "FEWEST": 3, "_MORE": 3},
+                "_LOOK_THROUGH": 0.5, "FEWEST": 3, "_MORE": 3},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
     "sessions": {"_ROUNDS": 3, "_ALONG": 0.7},
     "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},

@@ -15,9 +15,9 @@ from .loops import Survey
 PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: Places may be off by so many deviations of the way between them.
 _OFF = 3.0
-#: Errors of a drive on a plan beside that [m, rad]; no larger share of its places looks through
-#: walls of the plan.
-_NEAR, _LOOK_THROUGH = (0.2, 0.05), 0.4
+#: Errors of a drive on a plan beside that [m, rad]; of its places that are located there or look
+#: through walls of the plan, no larger share looks through.
+_NEAR, _LOOK_THROUGH = (0.2, 0.05), 0.5
 #: So many places agree at least, and so many times as many as are located elsewhere.
 FEWEST, _MORE = 3, 3
 
@@ -38,8 +38,8 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     """Find some key frames on a plan as `placed_on`; None if they may be elsewhere.
 
     Enough places agree, and few enough do not, wherever on the plan these are. Where the others are
-    looked at there, few of them look through its walls: the mirror image of a floor has places that
-    are alike, but other doors.
+    looked at there, few look through its walls beside those that are located: the mirror image of a
+    floor has places that are alike, but other doors. Places off the plan say nothing.
     """
     found = placed_on(plan, survey, frames, known)
     if found is None or not is_enough(len(found.places), found.others):
@@ -48,8 +48,9 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     spread = np.diag((way + known, way + known, turn)) ** 2
     for q, query in survey.queries(PLACES, frames):
         where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
-        is_through = where.evidence.contradicted > MOST_CONTRADICTED
-        against.append(is_through and q not in found.places)
+        is_there = bool(where) or q in found.places
+        if is_there or where.evidence.contradicted > MOST_CONTRADICTED:
+            against.append(not is_there)
     return found if np.mean(against) <= _LOOK_THROUGH else None
 
 
