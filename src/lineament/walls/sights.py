@@ -43,7 +43,7 @@ _SHARE = 0.2
 #: Lines whose directions differ by more are never one [rad].
 _TURN = 0.35
 #: Quantiles of 99 % of χ² with two degrees of freedom and with three: so many of the parts of a
-#: wall, and of a column, stay together.
+#: wall, and of a column, stay together; so many loops that are right count as such.
 _GATE, GATE_3 = -2.0 * math.log1p(-0.99), 11.344866730144371
 #: Where sights are placed already.
 _HERE = np.zeros((1, 3))
