@@ -153,6 +153,7 @@ def test_info_describes_a_plan_or_a_grid(plan, capsys):
         (["plan", "a.yaml", "-o", "a.yaml"], 1, "a.yaml: would replace a.yaml, which is read"),
         (["info", "other.svg"], 1, "other.svg: is no plan that lineament wrote"),
         (["info", "a.pgm"], 1, "a.pgm: is an image, expected the .yaml of the grid"),
+        (["info", "a.geojson"], 1, "a.geojson: a plan is a .dxf, .parquet, .svg or the .yaml"),
     ],
 )
 def test_what_cannot_be_converted_is_one_line(plan, refused, arguments, status, line):
@@ -160,6 +161,7 @@ def test_what_cannot_be_converted_is_one_line(plan, refused, arguments, status, 
         ("other.svg", '<svg xmlns="http://www.w3.org/2000/svg"><g id="walls"/></svg>'),
         ("broken.svg", "<svg"),
         ("log.npz", ""),
+        ("a.geojson", "{}"),
     ):
         Path(name).write_text(text, encoding="utf-8")
     plan.write("a.yaml")

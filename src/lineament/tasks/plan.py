@@ -20,8 +20,9 @@ from ..walls import lengths_of
 #: Formats that a plan is written in: pictures, and those that are read again or go on elsewhere.
 PICTURES = (".png", ".pdf")
 ENDINGS = (".dxf", ".yaml", ".svg", ".parquet", ".csv", ".jsonl", ".geojson", *PICTURES)
-#: What is described as a plan, and not as a log; images are refused with a hint at their grid.
-PLANS = (".dxf", ".svg", ".parquet", *GRID_ENDINGS, ".pgm", ".png")
+#: What is described as a plan, and not as a log; images are refused with a hint at their grid, and
+#: GeoJSON, which is only written, with what is read.
+PLANS = (".dxf", ".svg", ".parquet", *GRID_ENDINGS, ".pgm", ".png", ".geojson")
 
 
 def convert_plan(
