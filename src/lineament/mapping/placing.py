@@ -44,14 +44,16 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     found = placed_on(plan, survey, frames, known)
     if found is None or not is_enough(len(found.places), found.others):
         return None
-    (way, turn), against = _NEAR, []
+    way, turn = _NEAR
     spread = np.diag((way + known, way + known, turn)) ** 2
-    for q, query in survey.queries(PLACES, frames):
-        where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
-        is_there = bool(where) or q in found.places
-        if is_there or where.evidence.contradicted > MOST_CONTRADICTED:
-            against.append(not is_there)
-    return found if np.mean(against) <= _LOOK_THROUGH else None
+    looked = [
+        locate(query, plan, compose(found.move, survey.pose(q)), spread)
+        for q, query in survey.queries(PLACES, frames)
+        if q not in found.places
+    ]
+    there = len(found.places) + sum(map(bool, looked))
+    through = sum(not of and of.evidence.contradicted > MOST_CONTRADICTED for of in looked)
+    return found if through <= _LOOK_THROUGH * (through + there) else None
 
 
 def is_enough(agree: int, others: int) -> bool:
