@@ -72,10 +72,9 @@ class LazyFields:
         """Return the bytes of a table, or of the clusters, of which no array need be made."""
         k, dtype = _PARTS[name]
         try:
-            made = object.__getattribute__(self, name)
-        except AttributeError:
             return self._written[k]
-        return np.asarray(made, dtype).tobytes()
+        except AttributeError:  # made by its fields, or a copy
+            return np.asarray(getattr(self, name), dtype).tobytes()
 
     def counts(self) -> dict[str, int]:
         """Return how many features there are, by table.
