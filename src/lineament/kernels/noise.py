@@ -22,7 +22,7 @@ LEAST_SIGMA = 1e-4
 #: Nor worse, at its farthest measurement [m]: what is farther off is clutter.
 MOST_SIGMA = 0.1
 #: What scanners have: root of their mean variance [m], and the variance of the logarithm of theirs.
-#: From eight logs, ``docs/methods.md`` says which: medians of 0.4 to 14 mm.
+#: From the medians of eight logs, 0.4 to 14 mm; ``docs/methods.md`` says how far it holds.
 TYPICAL_SIGMA, SPREAD = 0.012, 4.5
 #: Deviations beyond which errors are no noise.
 _SIGMAS = 3.0

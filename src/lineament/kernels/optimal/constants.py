@@ -1,8 +1,8 @@
 """The constants of method `optimal`: each with its unit and what it means.
 
-``docs/results.md`` has a table of what happens where one of the first is halved or doubled. Lengths
-of the world are `TAU`, `REACH`, `MOST_DEVIATION` and `ARC_RADIUS`; all else is in units of the
-noise, of the beams, or a ratio.
+``docs/notebook.md`` says what happens where one of the first is halved or doubled. Lengths of the
+world are `TAU`, `REACH`, `MOST_DEVIATION` and `ARC_RADIUS`; all else is in units of the noise, of
+the beams, or a ratio.
 """
 
 import math

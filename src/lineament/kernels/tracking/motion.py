@@ -92,7 +92,7 @@ def estimate_motion(
 
 @helper
 def _are_there(before, now, pairs):
-    """Whether all pairs are of features that there are."""
+    """Whether all pairs name features of the two scans."""
     for kind in range(3):
         for k in range(len(pairs[kind])):
             i, j = pairs[kind][k, 0], pairs[kind][k, 1]
