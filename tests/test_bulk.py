@@ -140,6 +140,15 @@ def test_resume_does_all_again_with_another_configuration(logs, tmp_path):
     assert extract_logs(logs, out, IEPF, keep_going=True).whole == 0
 
 
+def test_a_log_has_one_file_whatever_format_it_had_before(logs, tmp_path):
+    out = tmp_path / "out"
+    extract_logs(logs, out, IEPF)
+    other = [path for path in logs if path.stem != "a"]
+    extract_logs(other, out, IEPF, ending=".csv", resume=True)
+    assert {path.name for path in (out / "log=a.npz").iterdir()} == {"part-0.parquet"}
+    assert {path.name for path in (out / "log=b.npz").iterdir()} == {"part-0.csv"}
+
+
 def test_logs_of_one_name_stay_apart_and_keep_their_names(tmp_path):
     days = [corner_log(tmp_path / day / "scan.npz", 3 + k) for k, day in enumerate(("mon", "tue"))]
     out = tmp_path / "out"

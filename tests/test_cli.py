@@ -426,6 +426,7 @@ def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
         ("plan wall.svg -o b.yaml --resolution nan", "resolution is nan m a cell, expected 0.0001"),
         ("plan wall.svg -o b.yaml --resolution 50", "resolution is 50 m a cell, expected 0.0001"),
         ("info wall.svg --scale 0.001", "--scale: is of a log, but wall.svg is a plan"),
+        ("extract a.bag -o b.csv --topic /a --topic /b", "--topic: expected one, not /a and /b"),
         ("view a.bag --layers A", "--layers: is of the plan of --map, which is not given"),
         ("simulate room -o a.npz --speed 2", "--speed: the scanner stands in world 'room'"),
         ("map a.bag -o b.svg --odometry /o --no-odometry", "expected none beside --no-odometry"),

@@ -119,6 +119,8 @@ def test_a_twist_must_be_finite():
     for times in ({"time_increment": 0.1}, {}):  # also where nothing is to be undone
         with pytest.raises(ValueError, match=r"twist is .*, expected three finite"):
             ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, **times), (NAN, 0.0, 0.0))
+    with pytest.raises(TypeError, match="scan is of type list, expected a LaserScan"):
+        ln.deskew([1.0], (1.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("twist", [(-1e6, 0.0, 0.0), (0.0, 1e6, 0.0), (0.0, 0.0, 1e6)])

@@ -147,6 +147,11 @@ def test_a_beam_that_is_not_there_is_refused(beam):
         explain(trace, beam)
 
 
+def test_what_is_no_trace_is_refused():
+    with pytest.raises(TypeError, match=r"type LaserScan, expected a Trace: lineament\.trace"):
+        explain(wall_with([], []), 3)
+
+
 def hall(sensor, seed):
     """Scan of a hall with round columns."""
     world, pose = scene("hall", seed)

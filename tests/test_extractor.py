@@ -61,6 +61,7 @@ def test_scans_that_differ_in_a_field_are_not_taken_for_each_other():
     ("changes", "message"),
     [
         ({"ranges": [1.0, 2.0]}, r"ranges has shape \(2,\), expected \(m, n\)"),
+        ({"ranges": [[1.0] * 3, [1.0]]}, "3 in row 0 and 1 in row 1, expected as many in each"),
         ({"ranges": [["a"]]}, r"ranges is \[\['a'\]\], expected numbers"),
         ({"workers": 0}, "workers is 0"),
         ({"workers": 1.5}, r"workers is 1\.5"),

@@ -270,6 +270,7 @@ def test_features_that_cannot_be_merged():
         ("have no scan", moved, AT_ROBOT),
         ("three finite numbers", two, [(0, 0, 0), (math.nan, 0, 0)]),
         ("theta = 180 rad, more than a turn", two, [(0, 0, 0), (0, 0, 180)]),
+        ("300 m from the robot's origin, .* in millimetres", two, [(0, 0, 0), (300, 0, 0)]),
         ("covariance", two, AT_ROBOT, np.eye(2)),
     ):
         with pytest.raises(ValueError, match=problem):

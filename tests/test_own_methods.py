@@ -193,6 +193,9 @@ def find(scan):
 def fails(scan):
     return [][3]
 
+def empty():
+    return []
+
 @dataclass(frozen=True)
 class Cut:
     "Cuts in two."
@@ -252,6 +255,7 @@ def test_commands_take_it(mine, capsys, refused):
     assert "at               60" in capsys.readouterr().out
     line = refused("extract wall.npz -m my.py:fails -o f.csv -q")
     assert line == "lineament: my.py:fails failed: IndexError: list index out of range (my.py:9)"
+    assert refused("extract wall.npz -m my.py:empty -o f.csv -q").endswith("but 1 was given")
     assert not (mine / "f.csv").exists()
     refused("extract wall.npz -m my.py:lost -o f.csv -q", 2)
 

@@ -254,7 +254,10 @@ def test_scan_has_the_sensor_s_fields():
     sensor = SENSORS["utm30lx"]
     scan = sensor.scan(room(), (0.5, -0.2, 1.0), np.random.default_rng(0), stamp=12.5)
     assert (scan.stamp, scan.pose, scan.frame_id) == (12.5, (0.5, -0.2, 1.0), "laser")
-    assert (scan.range_min, scan.range_max, scan.scan_time) == (0.1, 30.0, 1 / 40)
+    assert (scan.range_min, scan.range_max, scan.scan_time) == (0.1, 30.0, 0.0)
+    swept = sensor.scan(room(), (0.5, -0.2, 1.0), np.random.default_rng(0), 12.5, (0.0, 0.0, 0.0))
+    assert (swept.scan_time, swept.time_increment) == (1 / 40, sensor.time_increment)
+    np.testing.assert_array_equal(swept.ranges, scan.ranges)
     np.testing.assert_array_equal(scan.angles, sensor.angles)
 
 

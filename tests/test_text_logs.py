@@ -353,6 +353,7 @@ def test_faulty_csv_beams(write):
         list(open_log(path))
     log = open_log(path, keep_going=True)
     assert (list(log), log.skipped) == ([], 3)  # The last is the bearing of which the scan is made.
+    assert "range: value 2 of 2 is 'x', expected a number" in log.faults[1]
     assert "bearing 2 is nan" in log.faults[2]
 
 

@@ -332,6 +332,7 @@ def test_a_misspelt_name_is_named_with_what_it_may_be():
     for given, message in (
         ({"angle_max": 1.0}, r"angle_increment, \(angle_max - angle_min\)/\(n - 1\)"),
         ({"angle_inc": 0.01}, "no parameter 'angle_inc': is it angle_increment, a field of the"),
+        ({"max_range": 30}, "no parameter 'max_range': is it range_max, a field of the scan"),
         ({"rangemax": 30}, "no parameter 'rangemax': is it range_max, a field of the scan"),
         ({"evdence": 9}, r"no parameter 'evdence': is it evidence\? expected one of: evidence"),
         ({"xyz": 9}, "no parameter 'xyz': expected one of: evidence"),

@@ -75,12 +75,11 @@ print(locate(features, plan))
 # ## A whole log
 #
 # From the shell two commands do this. The second follows the robot, and reports
-# where it is lost. `--no-deskew` says that a scan is taken at once, as in this
-# simulation.
+# where it is lost.
 #
 # ```sh
 # lineament map monday.ros2.mcap -o plan.dxf
-# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv --no-deskew
+# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv
 # lineament view tuesday.ros2.mcap --map plan.dxf    # to look at it
 # ```
 #

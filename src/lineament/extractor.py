@@ -310,6 +310,12 @@ def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
             "batch takes no LaserScan, expected a matrix of ranges, one scan a row, with "
             "angle_min=... and angle_increment=...; an extractor itself takes a scan"
         )
+    if isinstance(ranges, list | tuple) and len({*map(np.size, ranges)}) > 1:
+        row = next(i for i, each in enumerate(ranges) if np.size(each) != np.size(first))
+        raise ValueError(
+            f"ranges has {np.size(first)} in row 0 and {np.size(ranges[row])} in row {row}, "
+            "expected as many in each: scans of one scanner"
+        )
     rows = numbers("ranges", ranges)
     if rows.ndim != 2:
         raise ValueError(f"ranges has shape {rows.shape}, expected (m, n): one scan a row")

@@ -27,7 +27,25 @@ PATH, TEXT_PATH = Place(path_type=Path), Place(path_type=str)
 LOG_PATH = LogPlace(path_type=Path)
 LOG = click.argument("log", type=LOG_PATH)
 SCAN = click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
-TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
+
+
+def _turned_into(convert: Callable[[Any], Any]) -> Callable[[Any, Any, Any], Any]:
+    """Return the callback of an option whose value a function of it alone converts."""
+    return lambda _context, _option, given: convert(given)
+
+
+def _one_topic(given: tuple[str, ...]) -> str | None:
+    if len(given) > 1:
+        raise click.UsageError(f"--topic: expected one, not {' and '.join(given)}")
+    return given[0] if given else None
+
+
+TOPIC = click.option(
+    "--topic",
+    multiple=True,
+    callback=_turned_into(_one_topic),
+    help="Which scans of the log.  [default: the format's own choice]",
+)
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 KEEP_GOING = click.option(
     "--keep-going", is_flag=True, help="Skip and count faulty lines and records."
@@ -49,11 +67,6 @@ LASER_POSE = click.option(
     metavar="X Y THETA",
     help="Pose of the laser on the robot, that poses are of [m, m, rad].",
 )
-
-
-def _turned_into(convert: Callable[[Any], Any]) -> Callable[[Any, Any, Any], Any]:
-    """Return the callback of an option whose value a function of it alone converts."""
-    return lambda _context, _option, given: convert(given)
 
 
 def _sectors(given: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:

@@ -36,7 +36,9 @@ def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, qu
 @SEED
 @click.option("--speed", type=float, help="Of the drive [m/s].  [default: 0.6]")
 @click.option("--rate", type=float, help="Scans a second.  [default: the sensor's]")
-@click.option("--moving", is_flag=True, help="Move while the scanner sweeps.")
+@click.option(
+    "--moving", is_flag=True, help="Sweep while moving; else all beams are taken at once."
+)
 @click.option(
     "--noise",
     "sigma",

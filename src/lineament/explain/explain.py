@@ -48,7 +48,7 @@ def explain(trace: Trace, beam: int) -> Explanation:
     in no feature are fitted here.
 
     The trace is of one scan, from `Extractor.trace` or `lineament.trace`; beams count from 0. There
-    is a ValueError if the beam is not there.
+    is a ValueError if the beam is not there, and a TypeError for something else than a trace.
 
     Examples
     --------
@@ -60,6 +60,10 @@ def explain(trace: Trace, beam: int) -> Explanation:
     >>> explain(trace, 10).outcome, explain(trace, 4).outcome
     ('noise', 'segment')
     """
+    if not isinstance(trace, Trace):
+        raise TypeError(
+            f"trace is of type {type(trace).__name__}, expected a Trace: lineament.trace(scan)"
+        )
     n = len(trace.scan)
     if isinstance(beam, bool) or not isinstance(beam, int) or not 0 <= beam < n:
         raise ValueError(f"beam is {beam!r}, expected a whole number from 0 to {n - 1}")

@@ -1,5 +1,6 @@
 """Scans as CSV: a row a scan below a header, or a row a beam of one scan."""
 
+import math
 import re
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Iterator
@@ -150,6 +151,7 @@ class CsvBeamsLog(_Csv):
     def _beams(self) -> Iterator[Iterable[float]]:
         """Yield bearing, range and intensity of each row; ValueError if there are too many."""
         places = _beam_places(self._names)
+        what = "angle, range" if places[2] < 0 else "angle, range, intensity"
         expected = max(places) + 1
         for count, (number, row) in enumerate(self._until_broken(self._lines())):
             self.limits.check("beams", count + 1)
@@ -157,8 +159,8 @@ class CsvBeamsLog(_Csv):
             try:
                 if len(cells) < expected:
                     raise ValueError(f"has {len(cells)} columns, expected {expected}")
-                words = [b"nan" if i < 0 else cells[i] or b"nan" for i in places]
-                yield numbers("angle, range, intensity: value", words)
+                words = [cells[i] or b"nan" for i in places if i >= 0]
+                yield [*numbers(f"{what}: value", words), math.nan][:3]
             except ValueError as error:
                 self._fault(LogError(self.name, str(error), line=number))
 

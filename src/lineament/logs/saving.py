@@ -176,6 +176,8 @@ def save_log(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
     ValueError
         If the ending is not known, before the first scan is asked for; or if the format cannot
         hold the scans.
+    TypeError
+        If it is one scan.
     LineamentError
         If the file cannot be written, or `scans` is a log that is read from it: ``list(log)`` has
         all of it in memory, and may replace it.
@@ -190,6 +192,8 @@ def save_log(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
     >>> [(scan.ranges.tolist(), scan.stamp, scan.pose) for scan in open_log(path)][1]
     ([1.5, 8.0], 2.5, (1.0, 2.0, 0.5))
     """
+    if isinstance(scans, LaserScan):
+        raise TypeError("scans is one LaserScan, expected several: [scan]")
     name = Path(path).name.lower()
     for ending, save in _WRITERS.items():
         if name.endswith(ending):

@@ -14,7 +14,7 @@ from ..drawings import check_file, plan_error
 from ..errors import LineamentError
 from ..limits import Limits
 from ..scan import Pose
-from ..scan.fields import checked_mounting
+from ..scan.fields import checked_place
 
 #: Values of cells, as in ROS.
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -128,7 +128,7 @@ def _checked(fields: dict[str, str]) -> About:
         raise ValueError(f"mode is {mode!r}, expected one of {', '.join(_MODES)}")
     if negate not in _TRUE + _FALSE:
         raise ValueError(f"negate is {negate!r}, expected 0 or 1")
-    x, y, yaw = checked_mounting(origin, "origin")
+    x, y, yaw = checked_place(origin, "origin")
     return About(fields["image"], resolution, (x, y, yaw), occupied, free, mode, negate in _TRUE)
 
 

@@ -14,7 +14,7 @@ from ..errors import LineamentError
 from ..files import naming_errors, written_beside
 from ..limits import Limits
 from ..scan import Array, LaserScan, Pose
-from ..scan.fields import checked_mounting
+from ..scan.fields import checked_place
 from .grid_files import (
     FREE,
     OCCUPIED,
@@ -71,7 +71,7 @@ class Grid:
             had = f"{cells.dtype} of shape {cells.shape}"
             raise ValueError(f"cells are {had}, expected int8 in rows and columns")
         check_resolution(self.resolution)
-        checked_mounting(self.origin, "origin")
+        checked_place(self.origin, "origin")
 
     @property
     def occupied(self) -> NDArray[np.bool_]:

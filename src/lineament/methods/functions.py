@@ -158,5 +158,6 @@ def _where(error: Exception) -> str:
     text = f"{type(error).__name__}: {error}"
     if isinstance(error, SyntaxError):
         return text
-    frames = traceback.extract_tb(error.__traceback__)
+    # Not the line here that calls the function: of one that takes no scan.
+    frames = [at for at in traceback.extract_tb(error.__traceback__) if at.filename != __file__]
     return f"{text} ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else text

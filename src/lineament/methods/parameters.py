@@ -74,7 +74,9 @@ def unknown(owner: str, name: str, known: Iterable[str]) -> str:
             "(angle_max - angle_min)/(n - 1) for n beams"
         )
     names = [*known, *_FIELDS]
-    near = [one for one in names if one.startswith(name)] or get_close_matches(name, names, n=1)
+    words = sorted(name.split("_"))  # max_range is range_max
+    near = [one for one in names if one.startswith(name) or sorted(one.split("_")) == words]
+    near = near or get_close_matches(name, names, n=1)
     hint = ""
     if near:
         hint = f"is it {near[0]}{'' if near[0] in known else ', a field of the scan'}? "

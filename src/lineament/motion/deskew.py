@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..scan import Array, LaserScan
 from ..scan.fields import checked_pose
+from ..scan.laser_scan import no_scan
 from ..scan.poses import Twist, poses_along
 
 #: Bearings that fall on each other are set apart by so much [rad].
@@ -67,6 +68,8 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     ValueError
         If the twist is not three finite numbers, or moves the sensor by a million metres or
         radians during the sweep.
+    TypeError
+        If it is no scan.
 
     Examples
     --------
@@ -76,6 +79,8 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     >>> deskew(scan, (1.0, 0.0, 0.0)).ranges.round(5).tolist()
     [2.0, 2.0, 2.0]
     """
+    if not isinstance(scan, LaserScan):
+        raise no_scan(scan)
     if twist is None or not any(checked_pose(twist, "twist")):
         return scan
     times = beam_times(scan)

@@ -23,6 +23,8 @@ FINEST = 1e-9
 FARTHEST = 4 * math.pi
 #: What is likely where bearings are too large.
 DEGREES = ": are they in degrees? (numpy.radians)"
+#: No robot that carries a 2-D scanner is longer [m]; a mounting of 5 cm in millimetres is not less.
+LONGEST = 50.0
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
 
@@ -240,12 +242,23 @@ def checked_pose(pose: Any, name: str = "pose") -> Pose:
         raise ValueError(f"{name} is {pose!r}, expected three finite numbers") from None
 
 
-def checked_mounting(laser_pose: Any, name: str = "laser_pose") -> Pose:
-    """Pose of the scanner on what poses are of: three finite numbers, the last an angle."""
-    pose = checked_pose(laser_pose, name)
+def checked_place(place: Any, name: str) -> Pose:
+    """Place that somebody wrote down: three finite numbers, the last an angle."""
+    pose = checked_pose(place, name)
     if abs(pose[2]) > 2 * math.pi:
         raise ValueError(f"{name} has theta = {pose[2]:g} rad, more than a turn{DEGREES}")
     return pose
+
+
+def checked_mounting(laser_pose: Any, name: str = "laser_pose") -> Pose:
+    """Pose of the scanner on what poses are of: a place within `LONGEST`."""
+    x, y, theta = checked_place(laser_pose, name)
+    if math.hypot(x, y) > LONGEST:
+        raise ValueError(
+            f"{name} is {math.hypot(x, y):g} m from the robot's origin, "
+            f"expected {LONGEST:g} m at most: is it in millimetres?"
+        )
+    return x, y, theta
 
 
 def covariance_of_pose(covariance: ArrayLike) -> Array:

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 
 from ..scan import Array, LaserScan, Pose
-from .drive import course
+from .drive import course, twists_of
 from .layouts import (
     DOOR,
     RECESS,
@@ -137,16 +137,15 @@ class Building:
         stamps, poses, twists = course(
             self.waypoints, speed, 1.0, sensor.rate if rate is None else rate
         )
-        twists *= moving
         truth: list[Pose] = [(x, y, theta) for x, y, theta in poses.tolist()]
         believed = [None] * len(truth) if wheels is None else wheels.odometry(truth, seed)
 
         def scans() -> Iterator[LaserScan]:
-            along = zip(stamps.tolist(), truth, believed, twists.tolist(), strict=True)
+            along = zip(stamps.tolist(), truth, believed, twists_of(twists, moving), strict=True)
             for i, (stamp, pose, odometry, twist) in enumerate(along):
                 world = self.with_people(seed, stamp, pose, people) if people else self.world
                 rng = np.random.default_rng([seed, i])
-                scan = sensor.scan(world, pose, rng, stamp, tuple(twist))
+                scan = sensor.scan(world, pose, rng, stamp, twist)
                 yield scan.with_pose(odometry)
 
         return scans(), truth

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..scan import Array, LaserScan
+from ..scan.poses import Twist
 from .sensor import Sensor
 from .worlds import World
 
@@ -71,7 +72,8 @@ def drive(
     rate : float, optional
         Scans a second [Hz]; the sensor's own if None.
     moving : bool
-        Whether the sensor moves while it sweeps, with the velocity that it has at the first beam.
+        Whether the sensor moves while it sweeps, with the velocity that it has at the first beam;
+        else all beams of a scan are taken at once.
 
     Returns
     -------
@@ -94,13 +96,16 @@ def drive(
         raise ValueError(f"seed is {seed}, expected a number ≥ 0")
     rate = sensor.rate if rate is None else rate
     stamps, poses, twists = course(waypoints, speed, turn_rate, rate)
-    if not moving:
-        twists[:] = 0.0
-    states = zip(stamps.tolist(), poses.tolist(), twists.tolist(), strict=True)
+    states = zip(stamps.tolist(), poses.tolist(), twists_of(twists, moving), strict=True)
     return (
-        sensor.scan(world, tuple(pose), np.random.default_rng([seed, i]), stamp, tuple(twist))
+        sensor.scan(world, tuple(pose), np.random.default_rng([seed, i]), stamp, twist)
         for i, (stamp, pose, twist) in enumerate(states)
     )
+
+
+def twists_of(twists: Array, moving: bool) -> list[Twist | None]:
+    """Return the twist of each scan, None for those that are taken at once."""
+    return [(vx, vy, omega) if moving else None for vx, vy, omega in twists.tolist()]
 
 
 def course(

@@ -86,7 +86,8 @@ def simulate_log(
         total = 100 if scans is None else scans
         plan, pose = scene(world, seed)
         rngs = (np.random.default_rng([seed, i]) for i in range(total))
-        taken = (sensor.scan(plan, pose, rng, i / rate) for i, rng in enumerate(rngs))
+        still = 0.0, 0.0, 0.0
+        taken = (sensor.scan(plan, pose, rng, i / rate, still) for i, rng in enumerate(rngs))
     save_log(path, track(taken, "simulating", range(total)))
 
 

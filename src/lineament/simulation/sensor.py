@@ -117,9 +117,9 @@ class Sensor:
         pose: Pose,
         rng: np.random.Generator,
         stamp: float = 0.0,
-        twist: Twist = (0.0, 0.0, 0.0),
+        twist: Twist | None = None,
     ) -> LaserScan:
-        """Simulate one sweep.
+        """Simulate one sweep, or all beams at once.
 
         In order: each beam leaves with an error of bearing; it may blend two depths; it may be
         cut short; noise is added; the range is rounded to the lattice; it may be lost. As many
@@ -134,8 +134,10 @@ class Sensor:
         rng : numpy.random.Generator
         stamp : float
             Time of the first beam [s].
-        twist : (v_x, v_y, omega)
-            Velocity of the sensor in its own frame [m/s, m/s, rad/s]; see `sweep`.
+        twist : (v_x, v_y, omega), optional
+            Velocity of the sensor in its own frame [m/s, m/s, rad/s]; see `sweep`. None: all beams
+            are taken at the stamp, and `scan_time` and `time_increment` are 0, so that nobody
+            removes a motion that did not take place.
 
         Returns
         -------
@@ -145,7 +147,7 @@ class Sensor:
         """
         normal = rng.standard_normal((2, self.n_beams))
         uniform = rng.random((5, self.n_beams))
-        poses = self.sweep(pose, twist) if any(twist) else np.array([pose])
+        poses = self.sweep(pose, twist) if twist and any(twist) else np.array([pose])
         ranges = self._footprint(world, poses, self.noise.bearing * normal[0], uniform[:2])
         ranges = self._cut_short(ranges, uniform[2:4])
         ranges = self._measure(ranges, normal[1])
@@ -158,8 +160,8 @@ class Sensor:
             range_min=self.range_min,
             range_max=self.range_max,
             stamp=stamp,
-            scan_time=1.0 / self.rate,
-            time_increment=self.time_increment,
+            scan_time=0.0 if twist is None else 1.0 / self.rate,
+            time_increment=0.0 if twist is None else self.time_increment,
             frame_id="laser",
             pose=pose,
         )

@@ -66,6 +66,9 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
             )
         row = replace(row, warnings=warnings)
         written = part.stat().st_size
+        for former in part.parent.glob("part-0.*"):
+            if former != part:  # in another format: the data set has one file of each log
+                former.unlink()
     except LineamentError as error:
         row = failed(row, str(error))
     except Exception as error:
