@@ -100,13 +100,17 @@ def moment_of(message: dict, later: float = 0.0) -> Moment:
     return moment
 
 
-def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:
+def header(stamp: float, frame: str) -> dict:
     sec = math.floor(stamp)
-    header = {"stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))}, "frame_id": parent}
+    return {"stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))}, "frame_id": frame}
+
+
+def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:
     x, y, theta = pose
     turned = {"z": math.sin(theta / 2), "w": math.cos(theta / 2)}
     transform = {"translation": {"x": x, "y": y}, "rotation": turned}
-    return {"transforms": [{"header": header, "child_frame_id": child, "transform": transform}]}
+    link = {"header": header(stamp, parent), "child_frame_id": child, "transform": transform}
+    return {"transforms": [link]}
 
 
 def pose_of(link: dict) -> Pose:
@@ -115,13 +119,9 @@ def pose_of(link: dict) -> Pose:
 
 
 def message_of(scan: ln.LaserScan, stamp: float) -> dict[str, Any]:
-    """A LaserScan of the frame ``laser`` as a driver writes it, at another time."""
-    sec = math.floor(stamp)
+    """A LaserScan as a driver writes it, at another time."""
     return {
-        "header": {
-            "stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))},
-            "frame_id": "laser",
-        },
+        "header": header(stamp, scan.frame_id),
         "angle_min": scan.angle_min,
         "angle_increment": scan.angle_increment,
         "range_max": 30.0,

@@ -1,7 +1,7 @@
 """Bags of ROS messages for tests and benchmarks, by the writers of rosbags and mcap."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from lineament import LogError
+from lineament import LaserScan, LogError
 from lineament.logs import open_log
 
 #: Every kind of bag that `write_bag` writes, by container, compression and serialisation.
@@ -92,6 +92,11 @@ class Messages:
         geometry = self._geometry(len(ranges), fields)
         return self.new("sensor_msgs/LaserScan", self.header(stamp, frame), *geometry, *values)
 
+    def of(self, scan: LaserScan) -> Any:
+        """Make the message of a scan: its ranges, bearings, stamp and frame."""
+        fields = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
+        return self.scan(scan.stamp, scan.ranges, frame=scan.frame_id, **fields)
+
     def echoes(
         self,
         stamp: float,
@@ -136,6 +141,11 @@ class Messages:
     def transform(self, stamp: float, parent: str, child: str, *pose: float) -> Any:
         header = self.header(stamp, parent)
         return self.new("geometry_msgs/TransformStamped", header, child, self._placed(*pose))
+
+    def mountings(self, places: Mapping[str, tuple[float, float, float]]) -> Any:
+        """Say where scanners are on a robot, by their topics: frames are named as these."""
+        links = (self.transform(0.0, "base_link", name[1:], *at) for name, at in places.items())
+        return self.transforms(*links)
 
     def transforms(self, *each: Any) -> Any:
         return self.new("tf2_msgs/TFMessage", list(each))

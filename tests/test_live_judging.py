@@ -57,8 +57,7 @@ def bag_of(folder, kind: str, *, odometry: str = "/tf"):
             add("/tf", stamp, messages.transforms(moved))
         else:
             add(odometry, stamp, messages.odometry(stamp, *moment.believed))
-        fields = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-        add("/scan", stamp + 0.01, messages.scan(stamp, scan.ranges, **fields))
+        add("/scan", stamp + 0.01, messages.of(scan))
         for claim in claims():
             if claim.stamp == stamp:
                 add("/amcl_pose", stamp + 0.02, messages.pose_with_covariance(stamp, *claim.pose))

@@ -53,10 +53,7 @@ class Robot:
 
     def __init__(self, plan: str, **options) -> None:
         self.pipeline = Pipeline(LiveConfig(map=plan, **options))
-        self.mount()
-
-    def mount(self) -> None:
-        """Say where the scanner is, by way of a frame between."""
+        # Where the scanner is, by way of a frame between.
         self.say(MOUNTINGS, StampedPose(0.0, "base_footprint", "/base_link", (0.0, 0.0, 0.0)))
         self.say(MOUNTINGS, StampedPose(0.0, "base_link", "laser", MOUNTING))
 
@@ -217,21 +214,13 @@ class Seconds:
         self.monotonic = partial(next, count(1.0))
 
 
-def lines_of(robot: Robot, moments, monkeypatch, *, moved: bool = False) -> list[str]:
-    """Lines of a node whose robot drives on, a report after each scan."""
-    monkeypatch.setattr("lineament.live.node.time", Seconds())
-    batches, lines = [], []
-    for moment in moments:
-        link = StampedPose(moment.scan.stamp, "odom", "base_footprint", moment.believed)
-        batches.append([Received("tf", partial(list, [link]), 0.0, LINKS)] if moved else [])
-        batches[-1].append(Received("a", partial(copy, moment.scan), 0.0))
-    Node(Given(*batches, []), robot.pipeline, [], write=lines.append).run()
-    return lines
-
-
 def test_a_gap_that_lasts_is_one_line(plan, monkeypatch):
+    """Of a node that reports after each scan."""
     robot, _ = located(plan)
-    lines = lines_of(robot, driven(1, 150)[30:], monkeypatch)
+    monkeypatch.setattr("lineament.live.node.time", Seconds())
+    batches = [[Received("a", partial(copy, moment.scan), 0.0)] for moment in driven(1, 150)[30:]]
+    lines: list[str] = []
+    Node(Given(*batches, []), robot.pipeline, [], write=lines.append).run()
     assert [line for line in lines if "not placed" in line] == [
         "the robot is not placed: base_footprint in odom is known only at earlier stamps, "
         "expected on /tf, or a topic of odometry"

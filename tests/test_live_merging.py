@@ -1,6 +1,5 @@
 """Several scanners live: their scans come one by one, and go out as one set of features."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,8 @@ import pytest
 import ros_bags
 from in_memory import Kept
 from live_driving import Running, eventually, points_of
-from robot_driving import link_message
+from robot_driving import link_message, message_of
+from test_merge_command import MOUNTINGS as PLACES
 
 import lineament as ln
 from lineament.cli import run
@@ -18,7 +18,6 @@ from lineament.rosmsg.poses import Odometry, StampedPose
 from lineament.scan.poses import compose
 from lineament.simulation import SENSORS, room
 
-PLACES = {"/front": (0.3, 0.25, math.pi / 4), "/rear": (-0.3, -0.25, -3 * math.pi / 4)}
 SENSOR = replace(SENSORS["utm30lx"], rate=10.0)
 MERGING = {"topic": "/front", "merge": ("/rear",), "unsure": (0.0, 0.0), "noise": 0.01}
 
@@ -123,14 +122,11 @@ def test_topics_and_mountings_have_the_namespace():
 def log(tmp_path):
     """A log of two scanners whose scans have the same stamps, the rear ones before."""
     messages = ros_bags.Messages(2)
-    fixed = [messages.transform(0.0, "base_link", name[1:], *at) for name, at in PLACES.items()]
-    items = [("/tf_static", 0, messages.transforms(*fixed))]
+    items = [("/tf_static", 0, messages.mountings(PLACES))]
     for k in range(8):
         for topic in ("/rear", "/front"):
             scan = scan_of(topic, 5 + k / 10, (0.02 * k, 0.0, 0.0), k)
-            fields = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-            message = messages.scan(scan.stamp, scan.ranges, frame=topic[1:], **fields)
-            items.append((topic, int(1e9 * scan.stamp), message))
+            items.append((topic, int(1e9 * scan.stamp), messages.of(scan)))
     return str(ros_bags.write(tmp_path, "mcap", items))
 
 
@@ -188,11 +184,7 @@ def test_two_topics_over_dds(peer, domain):
 
         def cloud():
             for topic in ("/rear", "/front"):
-                scan = scan_of(topic)
-                header = {"stamp": {"sec": 7, "nanosec": 0}, "frame_id": topic[1:]}
-                fields = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-                ranges = {"ranges": scan.ranges.tolist(), "range_max": 30.0}
-                peer.write(topic, {"header": header, **fields, **ranges})
+                peer.write(topic, message_of(scan_of(topic), 7.0))
             found = peer.take("/front/features")
             # The first one may be of one scanner alone.
             whole = [one for one in found if len(points_of(one)) > 9]

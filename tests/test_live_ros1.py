@@ -395,8 +395,6 @@ def test_without_rospy(monkeypatch):
 #: listener or to be ended, then for a line of input.
 NODE = """
 from lineament.live import LiveConfig
-from lineament.live.received import GUESS, MAP, ODOMETRY, RELOCATE
-from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.scene import Message
 import time

@@ -1,18 +1,14 @@
-"""What sinks say of the pose on a plan, and how they draw it; signals and scans that are late."""
-
-import signal
+"""What sinks say of the pose on a plan, and how they draw it."""
 
 import numpy as np
 import pytest
 from in_memory import Taken
 
 import lineament as ln
-from lineament.live import FoxgloveSink, LiveConfig, RosSink, run_live
+from lineament.live import FoxgloveSink, LiveConfig, RosSink
 from lineament.live.counters import Counts, Report
 from lineament.live.pipeline import Frame
 from lineament.live.plan_topics import statuses
-from lineament.live.stopping import stopping
-from lineament.logs import save_npz
 from lineament.mapping import VERDICTS, LineMap
 from lineament.mapping.evidence import Evidence
 from lineament.mapping.following import Whereabouts
@@ -91,21 +87,3 @@ def test_foxglove_draws_the_plan_in_grey(plan):
     assert sorted(np.reshape(layer.strips, (-1, 4)).tolist()) == sorted(
         [*a, *b] for a, b in LineMap.read(plan).ends.tolist()
     )
-
-
-def log_of(folder, stamps):
-    save_npz(folder / "a.npz", [ln.LaserScan([2.0] * 9, 0.0, 0.1, stamp=t) for t in stamps])
-    return str(folder / "a.npz")
-
-
-def test_a_signal_behind_the_start_ends_a_node_that_runs(tmp_path):
-    """It is noted, and the node comes to its end as always: with a report."""
-    config, reports = LiveConfig(log=log_of(tmp_path, [0.0, 0.1]), rate=1, ros=0, loop=True), []
-
-    def write(line):
-        assert "finds features" in line
-        signal.raise_signal(signal.SIGTERM)
-
-    with stopping() as is_stopped:
-        reports.append(run_live(config, is_stopped, write=write))
-    assert [type(report) for report in reports] == [Report]

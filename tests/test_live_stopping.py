@@ -5,7 +5,10 @@ import sys
 
 import pytest
 
+from lineament import LaserScan
+from lineament.live import LiveConfig, Report, run_live
 from lineament.live.stopping import stopping
+from lineament.logs import save_npz
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -31,6 +34,21 @@ def test_once_it_runs_signals_are_noted():
         for number in SIGNALS:
             signal.raise_signal(number)
             assert is_stopped()
+
+
+def test_a_signal_behind_the_start_ends_a_node_that_runs(tmp_path):
+    """It is noted, and the node comes to its end as always: with a report."""
+    log, reports = str(tmp_path / "a.npz"), []
+    save_npz(log, [LaserScan([2.0] * 9, 0.0, 0.1, stamp=stamp) for stamp in (0.0, 0.1)])
+
+    def write(line):
+        assert "finds features" in line
+        signal.raise_signal(signal.SIGTERM)
+
+    with stopping() as is_stopped:
+        config = LiveConfig(log=log, rate=1, ros=0, loop=True)
+        reports.append(run_live(config, is_stopped, write=write))
+    assert [type(report) for report in reports] == [Report]
 
 
 def test_what_an_interrupted_start_fails_with_is_not_told():

@@ -31,10 +31,7 @@ def made(
     """Write a drive through a room, on which the two scanners take turns, each at 10 Hz."""
     messages, sensor, items = ros_bags.Messages(ros_bags.ros_of(kind)), SENSORS["utm30lx"], []
     if frames:
-        links = [
-            messages.transform(0.0, "base_link", name[1:], *at) for name, at in mountings.items()
-        ]
-        items.append(("/tf_static", 0, messages.transforms(*links)))
+        items.append(("/tf_static", 0, messages.mountings(mountings)))
     stamps, poses = drive_poses(WAY, SPEED, 1.0, RATE)
     turns = itertools.cycle(mountings)
     for i, (stamp, pose) in enumerate(zip(stamps.tolist(), poses.tolist(), strict=True)):
@@ -128,16 +125,13 @@ def test_a_scanner_that_hangs_upside_down(tmp_path):
     turned = tmp_path / "turned"
     turned.mkdir()
     messages, items = ros_bags.Messages(2), []
-    links = [messages.transform(0.0, "base_link", name[1:], *at) for name, at in MOUNTINGS.items()]
-    half = MOUNTINGS["/rear"][2] / 2
-    links[1].transform.rotation.x, links[1].transform.rotation.y = math.cos(half), math.sin(half)
-    links[1].transform.rotation.z = links[1].transform.rotation.w = 0.0
-    items.append(("/tf_static", 0, messages.transforms(*links)))
+    fixed, half = messages.mountings(MOUNTINGS), MOUNTINGS["/rear"][2] / 2
+    rotation = fixed.transforms[1].transform.rotation
+    rotation.x, rotation.y, rotation.z, rotation.w = math.cos(half), math.sin(half), 0.0, 0.0
+    items.append(("/tf_static", 0, fixed))
     for topic, scan in open_log(log).items():
         seen = scan.turned_over() if topic == "/rear" else scan
-        fields = {"angle_min": seen.angle_min, "angle_increment": seen.angle_increment}
-        message = messages.scan(scan.stamp, seen.ranges, frame=topic[1:], **fields)
-        items.append((topic, int(scan.stamp * 1e9), message))
+        items.append((topic, int(scan.stamp * 1e9), messages.of(seen)))
     other = ros_bags.write(turned, "mcap", items)
     found = [
         merge_log(path, tmp_path / "f.csv", RIG, Extractor(noise=0.01)).features

@@ -42,10 +42,15 @@ def wall(x, first, last, sigma, **fields):
     return row
 
 
+def merged_walls(*walls):
+    """Return the segments of scanners in one place, each of which sees one wall."""
+    parts = [made(segments=[one]) for one in walls]
+    return merge_features(parts, AT_ROBOT).segments
+
+
 def test_walls_are_weighted_by_their_information():
-    one = made(segments=[wall(2.00, -1.0, 0.5, 0.01, rms=0.01)])
-    other = made(segments=[wall(2.03, -0.5, 1.5, 0.02, n_points=9, rms=0.02)])
-    (found,) = merge_features([one, other], AT_ROBOT).segments
+    one = wall(2.00, -1.0, 0.5, 0.01, rms=0.01)
+    (found,) = merged_walls(one, wall(2.03, -0.5, 1.5, 0.02, n_points=9, rms=0.02))
     # Weights are 1 / 0.01² and 1 / 0.02², at places 0.75 m apart where lines turn by 0.01 rad.
     assert found["n_points"] == 12
     assert found["rms"] == pytest.approx(math.sqrt((3 * 0.01**2 + 9 * 0.02**2) / 12))
@@ -57,8 +62,7 @@ def test_walls_are_weighted_by_their_information():
 
 
 def test_walls_at_one_place_are_a_weighted_mean():
-    walls = [made(segments=[wall(x, -1.0, 1.0, s)]) for x, s in ((2.0, 0.01), (2.03, 0.02))]
-    (found,) = merge_features(walls, AT_ROBOT).segments
+    (found,) = merged_walls(wall(2.0, -1.0, 1.0, 0.01), wall(2.03, -1.0, 1.0, 0.02))
     assert found["centroid"] == pytest.approx((2.0 + 0.03 / 5, 0.0))
     assert found["covariance"] == pytest.approx(np.diag([1 / 12500, 5e-5]), rel=1e-3, abs=1e-9)
 
@@ -66,23 +70,19 @@ def test_walls_at_one_place_are_a_weighted_mean():
 def test_walls_are_one_up_to_the_quantile_of_chi_square():
     limit = math.sqrt(-2 * math.log(0.001) * 2) * 0.01  # of the difference of two
     for share, count in ((0.99, 1), (1.01, 2)):
-        walls = [made(segments=[wall(x, -1.0, 1.0, 0.01)]) for x in (2.0, 2.0 + share * limit)]
-        assert len(merge_features(walls, AT_ROBOT).segments) == count
+        beside = wall(2.0 + share * limit, -1.0, 1.0, 0.01)
+        assert len(merged_walls(wall(2.0, -1.0, 1.0, 0.01), beside)) == count
         # A misfit of the surface is an error of each that noise does not explain.
-        rough = [made(segments=[wall(2.0, -1, 1, 0.01, misfit=0.02)]), walls[1]]
-        assert len(merge_features(rough, AT_ROBOT).segments) == 1
+        assert len(merged_walls(wall(2.0, -1, 1, 0.01, misfit=0.02), beside)) == 1
 
 
 @pytest.mark.parametrize(("first", "count"), [(1.15, 1), (1.25, 2), (0.5, 1)])
 def test_walls_with_a_doorway_between_them_are_two(first, count):
-    walls = [made(segments=[wall(2.0, -1.0, 1.0, 0.01)]), made(segments=[wall(2, first, 3, 0.01)])]
-    assert len(merge_features(walls, AT_ROBOT).segments) == count
+    assert len(merged_walls(wall(2.0, -1.0, 1.0, 0.01), wall(2, first, 3, 0.01))) == count
 
 
 def test_the_other_side_of_a_wall_is_another_wall():
-    behind = wall(2.0, 1.0, -1.0, 0.01)
-    walls = [made(segments=[wall(2.0, -1.0, 1.0, 0.01)]), made(segments=[behind])]
-    assert len(merge_features(walls, AT_ROBOT).segments) == 2
+    assert len(merged_walls(wall(2.0, -1.0, 1.0, 0.01), wall(2.0, 1.0, -1.0, 0.01))) == 2
 
 
 def test_nothing_of_one_scanner_becomes_one():

@@ -1,6 +1,5 @@
 """Scans from rclpy and features to rclpy, as the bytes that ROS 2 has on the wire."""
 
-import time
 from functools import partial
 from typing import Any
 
@@ -13,7 +12,7 @@ from std_srvs.srv import Empty
 
 from lineament.live import LiveConfig
 from lineament.live.publisher import Publisher
-from lineament.live.received import RELOCATE, SCAN, Received, Wanted, wanted
+from lineament.live.received import SCAN, Received, Wanted, relocation, wanted
 from lineament.output.scene import Message
 
 __all__ = ["RclpyPublisher", "RclpySource"]
@@ -110,8 +109,7 @@ class RclpySource:
 
     def _relocate(self, _: Any, response: Any) -> Any:
         """Answer the service: the robot is looked for on the whole plan."""
-        now = time.monotonic()
-        self._came.append(Received("the service", lambda: None, now, RELOCATE))
+        self._came.append(relocation())
         return response
 
     def _note_lost(self, status: Any) -> None:

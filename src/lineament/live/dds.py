@@ -88,13 +88,12 @@ class _Subscription:
     ) -> None:
         self._wanted, self.is_scan = wanted, wanted.what == SCAN
         self._kind = kind = wanted.kind.replace("/", "/msg/")
-        # Not to keep all of what is reliable: that would make the publisher wait.
-        policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]
-        if self.is_scan and reliability == "best-effort":
-            policies = [Policy.Reliability.BestEffort, Policy.History.KeepAll]
-            policies.append(Policy.ResourceLimits(max_samples=depth))
-        elif reliability == "best-effort" and not wanted.is_command:
-            policies[0] = Policy.Reliability.BestEffort
+        policies = [Policy.Reliability.BestEffort, Policy.History.KeepLast(depth)]
+        if wanted.is_command or reliability == "reliable":
+            # Not to keep all of what is reliable: that would make the publisher wait.
+            policies[0] = Policy.Reliability.Reliable(PATIENCE)
+        elif self.is_scan:
+            policies[1:] = Policy.History.KeepAll, Policy.ResourceLimits(max_samples=depth)
         opened = participant.topic(wanted.topic, kind)
         self.reader = RawReader(
             participant.entity, opened, _qos(kind, wanted.is_latched, *policies), depth

@@ -1,7 +1,7 @@
 """`MergingPipeline`: the scanners of a robot as one, which stands where the robot does."""
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 from .._copies import in_turn
@@ -46,8 +46,7 @@ class MergingPipeline(Pipeline):
         super().__init__(config)
         self._rig, self._tolerance = config.rig, config.tolerance
         self._frames, self._seen = Frames(), dict[str, Seen]()
-        self._alone: dict[str, int] = {}
-        self._why: dict[str, str] = {}
+        self._alone, self._why = Counter[str](), dict[str, str]()
 
     @in_turn
     def frames(self, publisher: str, scan: LaserScan) -> tuple[Frame, ...]:
@@ -61,10 +60,10 @@ class MergingPipeline(Pipeline):
         self._seen[publisher] = seen
         if publisher != self._rig.topics[0]:
             return ()
-        features = self._merged(seen, twist)
-        assert features.scan is not None  # Merged features have one.
-        whole = features.scan.with_pose(found.scan.pose, found.scan.pose_covariance)
-        frame = Frame(whole, whole, replace(features, scan=whole), None)
+        merged = self._merged(seen, twist)
+        assert merged.scan is not None  # Merged features have one.
+        merged.scan = merged.scan.with_pose(found.scan.pose, found.scan.pose_covariance)
+        frame = Frame(merged.scan, merged.scan, merged, None)
         return (self._followed(self._publisher(""), frame, None),)
 
     @in_turn
@@ -107,7 +106,7 @@ class MergingPipeline(Pipeline):
         )
 
     def _note_alone(self, topic: str, why: str) -> None:
-        self._alone[topic] = self._alone.get(topic, 0) + 1
+        self._alone[topic] += 1
         if self._alone[topic] >= MANY:
             self._why[topic] = f"scans of {topic} are left out: {why}"
 

@@ -88,22 +88,22 @@ class PlanTopics:
 
     def publish(self, frame: Frame, moment: Moment) -> None:
         """Publish what is known of a scan; a verdict that is another one than before, at once."""
-        config, make, send = self._config, self._make, self._publisher.publish
+        config, make, offer = self._config, self._make, self._publisher.offer
         before, self._frame, self._statuses = self._statuses, frame, statuses(frame, config)
         if [one[:3] for one in before] != [one[:3] for one in self._statuses]:
             self.diagnose(divmod(time.time_ns(), NANO))
         on_plan, where, placed = moment._replace(frame=config.map_frame), frame.where, frame.placed
-        if where is not None and where.is_known and self._is_heard(self._pose):
-            send(make.placed(self._pose, on_plan, where.pose, where.covariance))
+        if where is not None and where.is_known:
+            offer(self._pose, lambda to: make.placed(to, on_plan, where.pose, where.covariance))
         if config.judge_topic is not None:
             self._publish_judgement(frame, on_plan)
         elif placed is not None:
-            topic = config.resolved("amcl_pose")
-            send(make.placed(topic, on_plan, placed.base, placed.covariance))
-            if placed.odom is not None and config.is_broadcasting and self._is_heard("/tf"):
+            base, odom = (placed.base, placed.covariance), placed.odom
+            offer(config.resolved("amcl_pose"), lambda to: make.placed(to, on_plan, *base))
+            if odom is not None and config.is_broadcasting:
                 until = frame.scan.stamp_ns + round(config.transform_tolerance * NANO)
                 link = Moment(*stamp_of(until), config.odom_frame, config.map_frame)
-                send(make.transform("/tf", link, placed.odom))
+                offer("/tf", lambda to: make.transform(to, link, odom))
 
     def diagnose(self, time: tuple[int, int], *, is_stale: bool = False) -> None:
         """Publish verdicts on ``/diagnostics``."""
@@ -113,28 +113,23 @@ class PlanTopics:
             if is_stale:
                 status = status._replace(level=3, summary="no scans")
             self._publisher.publish(status.message(self._make, self._config, DIAGNOSTICS, time))
-        if self._frame.plan is not None and self._is_heard(self._walls):
-            on_map = Moment(*time, self._config.map_frame, self._config.map_frame)
-            walls = plan_layers(self._frame.plan)
-            self._publisher.publish(self._make.features(self._walls, on_map, walls))
+        if (plan := self._frame.plan) is not None:
+            on_map, make = Moment(*time, *[self._config.map_frame] * 2), self._make
+            self._publisher.offer(
+                self._walls, lambda to: make.features(to, on_map, plan_layers(plan))
+            )
 
     def _publish_judgement(self, frame: Frame, on_plan: Moment) -> None:
         """Publish the verdict on somebody else's pose, and where it is wrong ours, if known."""
-        config, placed, judgement = self._config, frame.placed, frame.judgement
+        config, make, offer = self._config, self._make, self._publisher.offer
+        placed, judgement, status = frame.placed, frame.judgement, self._statuses[-1]
         if judgement is None:
             return
-        status = self._statuses[-1]
         stamp = on_plan.seconds, on_plan.nanoseconds
-        if self._is_heard(topic := f"{config.judge_topic}/verdict"):
-            self._publisher.publish(status.message(self._make, config, topic, stamp))
-        is_known = placed is not None and judgement.off is not None
-        if is_known and status.level == 2 and self._is_heard(topic := f"{config.judge_topic}/ours"):
-            assert placed is not None
-            ours = self._make.placed(topic, on_plan, placed.base, placed.covariance)
-            self._publisher.publish(ours)
-
-    def _is_heard(self, topic: str) -> bool:
-        return self._publisher.listeners(topic) > 0
+        offer(f"{config.judge_topic}/verdict", lambda to: status.message(make, config, to, stamp))
+        if placed is not None and judgement.off is not None and status.level == 2:
+            ours = placed.base, placed.covariance
+            offer(f"{config.judge_topic}/ours", lambda to: make.placed(to, on_plan, *ours))
 
 
 def statuses(frame: Frame, config: LiveConfig) -> list[Status]:

@@ -1,6 +1,7 @@
 """`Publisher`: what carries the messages of a node to others."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 from ..output.scene import Message
@@ -32,6 +33,11 @@ class Publisher(ABC):
         if message.topic not in self._topics:
             self.advertise(message.topic, message.kind)
         self._send(self._topics[message.topic], message)
+
+    def offer(self, topic: str, make: Callable[[str], Message]) -> None:
+        """Make a message of a topic, and send it, if the topic has listeners."""
+        if self.listeners(topic):
+            self.publish(make(topic))
 
     def listeners(self, topic: str) -> int:
         """Return the number of listeners of a topic, or 1 if it has some; 0 if not advertised.

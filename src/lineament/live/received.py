@@ -86,6 +86,11 @@ class Wanted(NamedTuple):
         return Received(self.publisher or publisher, read, time.monotonic(), self.what)
 
 
+def relocation() -> Received:
+    """Return what a source gives of a call of the service that has a robot looked for anew."""
+    return Received("the service", lambda: None, time.monotonic(), RELOCATE)
+
+
 def wanted(config: LiveConfig) -> list[Wanted]:
     """Return the topics that a node listens to: the scans, then what has to be known before."""
     kind, limits = f"sensor_msgs/{config.type}", Limits.of(config.limits)

@@ -95,8 +95,7 @@ class ReplaySource:
             self._overhear()
         self._items = self._measured()
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
-        # The first scan is due when it is first asked for.
-        self._has_begun, self._due, self._topic, self._stamp = False, 0.0, "", math.nan
+        self._due, self._topic, self._stamp = math.nan, "", math.nan
         self._played: set[str] = set()
         #: Whether the log is at its end.
         self.ended = False
@@ -176,8 +175,8 @@ class ReplaySource:
             topic, step = self._next[0], self._next[1].stamp - self._stamp
             is_next = 0 < step <= _LEAP or (step == 0 and topic != self._topic)
             self._due += (step if is_next else _STEP) / (self._rate or math.inf)
-        if not self._has_begun:
-            self._has_begun, self._due = True, self._clock()
+        if math.isnan(self._due):  # The first scan is due when it is first asked for.
+            self._due = self._clock()
         return True
 
     def _following(self) -> tuple[str, LaserScan] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import xmlrpc.client
 from collections.abc import Callable
 from functools import cache, partial
@@ -13,7 +12,7 @@ from ..errors import LineamentError, one_line
 from ..output.scene import Message
 from .config import LiveConfig
 from .publisher import Publisher
-from .received import RELOCATE, SCAN, Inbox, Received, Wanted, wanted
+from .received import SCAN, Inbox, Received, Wanted, relocation, wanted
 
 #: How long the master may take to answer [s].
 _PATIENCE = 3.0
@@ -104,7 +103,9 @@ class Ros1Source:
         self._service = None
         if config.can_relocate:  # The service that AMCL has.
             name = config.resolved("global_localization")
-            self._service = node.serve(name, "std_srvs/Empty", self._relocate)
+            self._service = node.serve(
+                name, "std_srvs/Empty", lambda: self._inbox.put(relocation())
+            )
 
     @property
     def lost(self) -> int:
@@ -153,9 +154,6 @@ class Ros1Source:
         came = wanted.received(publisher, message.raw, "ros1")
         missing = self._missing(publisher, message.raw) if wanted.what == SCAN else 0
         self._inbox.put(came, missing)
-
-    def _relocate(self) -> None:
-        self._inbox.put(Received("the service", lambda: None, time.monotonic(), RELOCATE), 0)
 
     def _missing(self, publisher: str, data: bytes) -> int:
         """Count the scans between the last of a publisher and this one, by their numbers."""

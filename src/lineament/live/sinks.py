@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of, world_of
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Moment, layers_of, world_of
 from .config import LiveConfig
 from .configured import plan_of
 from .counters import Report
@@ -86,33 +85,25 @@ class RosSink:
         moment = _moment(frame, scan.frame_id or (LASER_FRAME if self._publishes_scan else ""))
         if frame.where is not None:
             moment = moment._replace(world=self._config.odom_frame)  # which is on the plan
-        messages: list[tuple[str, Callable[[str], Message]]] = [
-            (f"{topic}/features", lambda to: make.cloud(to, moment, features, frame.tracks)),
-            (f"{topic}/corners", lambda to: make.corners(to, moment, features)),
-            (
-                f"{topic}/markers",
-                lambda to: make.features(
-                    to, moment, layers_of(markers_of(features, frame.straight))
-                ),
-            ),
-        ]
+        offer = self._publisher.offer
+        offer(f"{topic}/features", lambda to: make.cloud(to, moment, features, frame.tracks))
+        offer(f"{topic}/corners", lambda to: make.corners(to, moment, features))
+        offer(
+            f"{topic}/markers",
+            lambda to: make.features(to, moment, layers_of(markers_of(features, frame.straight))),
+        )
         if (travel := frame.travel) is not None:
-            messages.append((f"{topic}/odometry", lambda to: make.odometry(to, moment, travel)))
+            offer(f"{topic}/odometry", lambda to: make.odometry(to, moment, travel))
         if (dock := frame.dock) is not None:
-            messages += [
-                (f"{topic}/dock", lambda to: make.placed(to, moment, dock.pose, dock.covariance)),
-                (self._docked, lambda to: make.pose(to, moment, dock.pose)),
-            ]
+            offer(f"{topic}/dock", lambda to: make.placed(to, moment, dock.pose, dock.covariance))
+            offer(self._docked, lambda to: make.pose(to, moment, dock.pose))
         if self._publishes_scan:
             if (seen_from := scan.pose) is not None:
-                messages.append(("/tf", lambda to: make.transform(to, moment, seen_from)))
+                offer("/tf", lambda to: make.transform(to, moment, seen_from))
             if scan.is_regular:
-                messages.append((topic, lambda to: make.scan(to, moment, scan)))
+                offer(topic, lambda to: make.scan(to, moment, scan))
             else:
-                messages.append((f"{topic}/points", lambda to: make.points(to, moment, scan)))
-        for name, message in messages:
-            if self._publisher.listeners(name):
-                self._publisher.publish(message(name))
+                offer(f"{topic}/points", lambda to: make.points(to, moment, scan))
         if self._plan is not None:
             self._plan.publish(frame, moment)
 
@@ -177,9 +168,9 @@ class FoxgloveSink:
 
     def diagnose(self, report: Report, time: tuple[int, int]) -> None:  # noqa: ARG002
         """Publish the plan again, for who has come since."""
-        if self._plan and self._publisher.listeners(topic := f"{self._topic}/plan"):
-            moment = Moment(*time, WORLD_FRAME, "")
-            self._publisher.publish(self._messages.features(topic, moment, self._plan))
+        moment, plan, make = Moment(*time, WORLD_FRAME, ""), self._plan, self._messages
+        if plan:
+            self._publisher.offer(f"{self._topic}/plan", lambda to: make.features(to, moment, plan))
 
 
 def _moment(frame: Frame, name: str) -> Moment:
