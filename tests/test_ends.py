@@ -213,31 +213,27 @@ def test_ctrl_c_while_the_command_is_imported(monkeypatch, capsys):
     assert capsys.readouterr() == ("", "lineament: stopped\n")
 
 
-@posix
-@pytest.mark.filterwarnings("ignore")
-def test_a_signal_that_is_lost_in_a_callback_comes_again(capsys, monkeypatch):
+def lost_in_a_callback(*_, **__):
     class Callback:
         def __del__(self):
             signal.raise_signal(signal.SIGTERM)
 
-    def wait(*_, **__):
-        del (found := [Callback()])[0]
-        assert not found
-        signal.pause()
+    del (found := [Callback()])[0]
+    assert not found
+    signal.pause()
 
-    monkeypatch.setattr("lineament.methods.describe", wait)
-    assert run(["methods"]) == 128 + signal.SIGTERM
-    assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+def cleared_by_compiled_code(*_, **__):
+    for _ in range(3):
+        with suppress(BaseException):  # as PyErr_Clear does
+            signal.raise_signal(signal.SIGTERM)
+    time.sleep(10)
 
 
 @posix
-def test_a_signal_that_compiled_code_clears_comes_again(capsys, monkeypatch):
-    def wait(*_, **__):
-        for _ in range(3):
-            with suppress(BaseException):  # as PyErr_Clear does
-                signal.raise_signal(signal.SIGTERM)
-        time.sleep(10)
-
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("wait", [lost_in_a_callback, cleared_by_compiled_code])
+def test_a_signal_that_is_lost_comes_again(wait, capsys, monkeypatch):
     monkeypatch.setattr("lineament.methods.describe", wait)
     assert run(["methods"]) == 128 + signal.SIGTERM
     assert capsys.readouterr() == ("", "lineament: stopped\n")
