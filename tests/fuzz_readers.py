@@ -114,7 +114,7 @@ class Readers(Target):
 
     watched = ("lineament/logs", "lineament/rosmsg")
 
-    def __init__(self, folder: Path, recordings: Path | None) -> None:
+    def __init__(self, folder: Path, recordings: Path | None = None) -> None:
         own = folder / "samples"
         own.mkdir()
         self._folders = scratch(folder)

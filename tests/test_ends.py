@@ -28,7 +28,6 @@ from lineament.cli import cli, run, terminating
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
 from lineament.logs import open_log, save_npz
-from lineament.logs.opening import readers
 from lineament.output import ENDINGS, open_writer
 from lineament.simulation import SENSORS, drive
 from lineament.simulation import room as small_room
@@ -459,12 +458,6 @@ def test_a_long_text_that_becomes_shorter(tmp_path):
     halve([path])
     with pytest.raises(LogError, match=r"a\.log:\d+: has become shorter while it was read"):
         next(scans)
-
-
-def test_every_reader_is_among_them(samples):
-    kinds = {sample.kind.partition("-")[0] for sample in samples}
-    formats = {reader.format for reader in readers()}
-    assert formats - {"rosbag2"} | {"sqlite3", "csv_beams"} <= kinds
 
 
 # Others
