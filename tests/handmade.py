@@ -122,7 +122,7 @@ def shuffled(truth, seed):
     return replace(truth, **tables, clusters=numbers[truth.clusters].astype(np.int32))
 
 
-def assert_alike(found, expected, rtol=1e-6):
+def assert_alike(found, expected):
     """Hold features equal but for rounding, in every field of every table."""
     np.testing.assert_array_equal(found.clusters, expected.clusters)
     for name, dtype in TABLES.items():
@@ -133,6 +133,4 @@ def assert_alike(found, expected, rtol=1e-6):
             if a.dtype.kind not in "fc":
                 assert a.tolist() == b.tolist(), field
                 continue
-            # A corner of nearly parallel lines is as far off as they are alike.
-            loose = 1e-6 if name == "corners" else rtol
-            np.testing.assert_allclose(a, b, rtol=loose, atol=1e-9, err_msg=field)
+            np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-9, err_msg=field)

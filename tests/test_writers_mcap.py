@@ -18,7 +18,6 @@ from lineament.output import open_writer
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)
-LAYERS = ["segments", "arcs", "corners", "edges", "ellipses"]
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
@@ -74,10 +73,6 @@ def read_ros2(path):
 both = pytest.mark.parametrize(
     ("name", "read"), [("a.mcap", read_foxglove), ("a.ros2.mcap", read_ros2)]
 )
-
-
-def points_of(points):
-    return np.array([(p.get("x", 0.0), p.get("y", 0.0)) for p in points])
 
 
 @both
