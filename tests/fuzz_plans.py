@@ -25,9 +25,6 @@ from lineament.simulation import SENSORS, World
 from lineament.simulation.buildings import office
 from lineament.simulation.raycast import cast_rays
 
-#: Numbers that a drawing or a row may hold instead of its own.
-ODD = (math.nan, math.inf, -math.inf, 1e308, -1e300, 1e12, 0.0, -1.0, 1e-300)
-
 Lines = list[tuple[complex, complex]]
 
 

@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
+from fuzz_targets import Target
 from mutations import Sample, mutated, own_samples, recorded_samples
 
 from lineament import LaserScan, LogError
@@ -108,12 +109,12 @@ def chosen(samples: list[Sample], chance: Random) -> Sample:
     return chance.choice([sample for sample in samples if sample.kind == kind])
 
 
-class Readers:
+class Readers(Target):
     """Damaged logs, read in every way; what runs new lines of the readers is damaged further."""
 
     watched = ("lineament/logs", "lineament/rosmsg")
 
-    def __init__(self, folder: Path, recordings: Path | None) -> None:
+    def __init__(self, folder: Path, recordings: Path | None = None) -> None:
         own = folder / "samples"
         own.mkdir()
         self._folders = scratch(folder)
@@ -127,9 +128,6 @@ class Readers:
     def check(self, made: tuple[Sample, dict[str, Any]]) -> str:
         sample, options = made
         return f"{sample.kind}: {'read' if check(sample, self._folders, options) else 'refused'}"
-
-    def close(self) -> None:
-        """Nothing is open."""
 
     def keep(self, made: tuple[Sample, dict[str, Any]]) -> None:
         """Take an input into the corpus, if it is small: else each is longer than the last."""

@@ -37,7 +37,7 @@ from lineament.output import ENDINGS, open_writer
 from lineament.output.ros_messages import RosMessages
 from lineament.rosmsg.poses import odometry
 from lineament.view import Session
-from lineament.view.api import RequestError, answer
+from lineament.view.api import _ROUTES, RequestError, answer
 
 NOISES = (None, None, RangeNoise(0.01), RangeNoise(0.0), RangeNoise(0.002, 0.01, 1e-3, 0.01))
 
@@ -187,16 +187,7 @@ class Writers(Target):
 class Viewer(Target):
     """Requests to the page's server: strict JSON, or 400 or 404 and one line."""
 
-    NEEDED: ClassVar = {
-        "/api/logs": (),
-        "/api/log": ("log",),
-        "/api/stamps": ("log", "first", "count"),
-        "/api/poses": ("log", "first", "count"),
-        "/api/drive": ("log", "first", "step", "count"),
-        "/api/scan": ("log", "i", "method"),
-        "/api/trace": ("log", "i", "method", "beam"),
-        "/api/npz": ("log", "i"),
-    }
+    NEEDED: ClassVar = {path: names for path, (_, names) in _ROUTES.items()}
     PATHS = (*NEEDED, "/api", "/", "/../etc/passwd")
     NAMES = ("i", "method", "beam", "first", "step", "count", "log", "x", "")
     VALUES = ("0", "1", "3", "-1", "99999", "9" * 30, "1.5", "nan")

@@ -131,10 +131,9 @@ def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None
         targets["readers"].keep(pickle.loads(path.read_bytes()))
     lines = Lines(Readers.watched)
     saved = state / f"worker-{worker}.json"
-    counts = Counter(json.loads(saved.read_text())["counts"]) if saved.exists() else Counter()
-    slowest: dict[str, float] = json.loads(saved.read_text())["slowest"] if saved.exists() else {}
-    hours = json.loads(saved.read_text())["hours"] if saved.exists() else 0.0
-    begin = json.loads(saved.read_text())["next"] if saved.exists() else worker
+    found = _state(saved)
+    counts, slowest, hours = Counter(found["counts"]), found["slowest"], found["hours"]
+    begin = found.get("next", worker)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     warnings.simplefilter("error")
     warnings.simplefilter("ignore", LineamentWarning)  # of what is made by chance
@@ -234,12 +233,16 @@ def _blame(state: Path, worker: int, status: int) -> None:
     number, name, made = pickle.loads((state / f"worker-{worker}.now").read_bytes())
     _keep(state, number, name, made, f"ended the worker with status {status}")
     saved = state / f"worker-{worker}.json"
-    found = json.loads(saved.read_text()) if saved.exists() else {}
-    empty = {"hours": 0.0, "memory": 0.0, "slowest": {}, "counts": {}}
     workers = len(list(state.glob("worker-*.now")))
-    found = empty | found | {"next": number + workers}
+    found = _state(saved) | {"next": number + workers}
     found["counts"][f"{name}/CRASH OR HANG"] = found["counts"].get(f"{name}/CRASH OR HANG", 0) + 1
     saved.write_text(json.dumps(found))
+
+
+def _state(saved: Path) -> dict[str, Any]:
+    """Return what a worker has saved, or what it begins with."""
+    empty = {"hours": 0.0, "memory": 0.0, "slowest": {}, "counts": {}}
+    return empty | (json.loads(saved.read_text()) if saved.exists() else {})
 
 
 def _states(state: Path) -> list[dict[str, Any]]:

@@ -8,44 +8,49 @@ import numpy as np
 from lineament.features import ARC, BREAKPOINT, CORNER, EDGE, SEGMENT, TABLES, Features
 
 
+def _row(dtype, **fields):
+    """Return a record of these fields; the others are 0."""
+    row = np.zeros((), dtype)
+    for name, value in fields.items():
+        row[name] = value
+    return row
+
+
 def segment(start, end, first, last, *, sigma=(0.01, 0.01), n_points=None):
     """Return a segment whose centroid is its middle; of as many points as it has beams."""
     (x1, y1), (x2, y2) = start, end
-    row = np.zeros((), SEGMENT)
-    row["start"], row["end"], row["centroid"] = start, end, ((x1 + x2) / 2, (y1 + y2) / 2)
-    row["angle"], row["length"] = math.atan2(y2 - y1, x2 - x1), math.dist(start, end)
-    row["covariance"] = np.diag(np.square(sigma))
-    row["first_beam"], row["last_beam"] = first, last
-    row["n_points"] = last - first + 1 if n_points is None else n_points
-    return row
+    return _row(
+        SEGMENT,
+        start=start,
+        end=end,
+        centroid=((x1 + x2) / 2, (y1 + y2) / 2),
+        angle=math.atan2(y2 - y1, x2 - x1),
+        length=math.dist(start, end),
+        covariance=np.diag(np.square(sigma)),
+        first_beam=first,
+        last_beam=last,
+        n_points=last - first + 1 if n_points is None else n_points,
+    )
 
 
 def corner(x, y, *, segments=(0, 0), sigma=0.01, kind="corner"):
-    row = np.zeros((), CORNER)
-    row["position"], row["segments"], row["kind"] = (x, y), segments, kind
-    row["covariance"] = np.square(sigma) * np.eye(2)
-    return row
+    spread = np.square(sigma) * np.eye(2)
+    return _row(CORNER, position=(x, y), covariance=spread, segments=segments, kind=kind)
 
 
 def edge(x, y, *, segment=0, side="end", sigma=0.01):
-    row = np.zeros((), EDGE)
-    row["position"], row["segment"], row["side"] = (x, y), segment, side
-    row["covariance"] = np.square(sigma) * np.eye(2)
-    return row
+    spread = np.square(sigma) * np.eye(2)
+    return _row(EDGE, position=(x, y), covariance=spread, segment=segment, side=side)
 
 
 def arc(x, y, radius, first, last, *, sigma=0.01):
-    row = np.zeros((), ARC)
-    row["center"], row["radius"] = (x, y), radius
-    row["covariance"] = np.square(sigma) * np.eye(3)
-    row["first_beam"], row["last_beam"], row["n_points"] = first, last, last - first + 1
-    return row
+    beams = {"first_beam": first, "last_beam": last, "n_points": last - first + 1}
+    spread = np.square(sigma) * np.eye(3)
+    return _row(ARC, center=(x, y), radius=radius, covariance=spread, **beams)
 
 
 def breakpoint_at(before, after, kind="jump"):
-    row = np.zeros((), BREAKPOINT)
-    row["beam"], row["kind"] = (before, after), kind
-    return row
+    return _row(BREAKPOINT, beam=(before, after), kind=kind)
 
 
 def features(n=100, segments=(), corners=(), arcs=(), breakpoints=(), clusters=None, edges=()):
@@ -117,7 +122,7 @@ def shuffled(truth, seed):
     return replace(truth, **tables, clusters=numbers[truth.clusters].astype(np.int32))
 
 
-def assert_alike(found, expected, rtol=1e-6):
+def assert_alike(found, expected):
     """Hold features equal but for rounding, in every field of every table."""
     np.testing.assert_array_equal(found.clusters, expected.clusters)
     for name, dtype in TABLES.items():
@@ -128,6 +133,4 @@ def assert_alike(found, expected, rtol=1e-6):
             if a.dtype.kind not in "fc":
                 assert a.tolist() == b.tolist(), field
                 continue
-            # A corner of nearly parallel lines is as far off as they are alike.
-            loose = 1e-6 if name == "corners" else rtol
-            np.testing.assert_allclose(a, b, rtol=loose, atol=1e-9, err_msg=field)
+            np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-9, err_msg=field)

@@ -28,7 +28,6 @@ from lineament.cli import cli, run, terminating
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
 from lineament.logs import open_log, save_npz
-from lineament.logs.opening import readers
 from lineament.output import ENDINGS, open_writer
 from lineament.simulation import SENSORS, drive
 from lineament.simulation import room as small_room
@@ -213,31 +212,27 @@ def test_ctrl_c_while_the_command_is_imported(monkeypatch, capsys):
     assert capsys.readouterr() == ("", "lineament: stopped\n")
 
 
-@posix
-@pytest.mark.filterwarnings("ignore")
-def test_a_signal_that_is_lost_in_a_callback_comes_again(capsys, monkeypatch):
+def lost_in_a_callback(*_, **__):
     class Callback:
         def __del__(self):
             signal.raise_signal(signal.SIGTERM)
 
-    def wait(*_, **__):
-        del (found := [Callback()])[0]
-        assert not found
-        signal.pause()
+    del (found := [Callback()])[0]
+    assert not found
+    signal.pause()
 
-    monkeypatch.setattr("lineament.methods.describe", wait)
-    assert run(["methods"]) == 128 + signal.SIGTERM
-    assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+def cleared_by_compiled_code(*_, **__):
+    for _ in range(3):
+        with suppress(BaseException):  # as PyErr_Clear does
+            signal.raise_signal(signal.SIGTERM)
+    time.sleep(10)
 
 
 @posix
-def test_a_signal_that_compiled_code_clears_comes_again(capsys, monkeypatch):
-    def wait(*_, **__):
-        for _ in range(3):
-            with suppress(BaseException):  # as PyErr_Clear does
-                signal.raise_signal(signal.SIGTERM)
-        time.sleep(10)
-
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("wait", [lost_in_a_callback, cleared_by_compiled_code])
+def test_a_signal_that_is_lost_comes_again(wait, capsys, monkeypatch):
     monkeypatch.setattr("lineament.methods.describe", wait)
     assert run(["methods"]) == 128 + signal.SIGTERM
     assert capsys.readouterr() == ("", "lineament: stopped\n")
@@ -463,12 +458,6 @@ def test_a_long_text_that_becomes_shorter(tmp_path):
     halve([path])
     with pytest.raises(LogError, match=r"a\.log:\d+: has become shorter while it was read"):
         next(scans)
-
-
-def test_every_reader_is_among_them(samples):
-    kinds = {sample.kind.partition("-")[0] for sample in samples}
-    formats = {reader.format for reader in readers()}
-    assert formats - {"rosbag2"} | {"sqlite3", "csv_beams"} <= kinds
 
 
 # Others

@@ -13,7 +13,7 @@ from random import Random
 import pytest
 from fuzz_forms import Forms, Results
 from fuzz_plans import Locating, Plans
-from fuzz_readers import OPTIONS, check, chosen, scratch
+from fuzz_readers import OPTIONS, Readers, check, scratch
 from fuzz_targets import Messages, Methods, Viewer, Writers
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -42,15 +42,6 @@ def test_samples_are_logs(samples, folders, options):
     """Else damage would show nothing."""
     for sample in samples:
         assert check(sample, folders, options)
-
-
-@pytest.mark.slow
-@settings_of_all
-@given(st.integers(min_value=0))
-def test_damaged_logs(samples, folders, seed):
-    chance = Random(seed)
-    sample = mutated(chosen(samples, chance), samples, chance)
-    check(sample, folders, chance.choice(OPTIONS))
 
 
 @settings_of_all
@@ -91,10 +82,11 @@ def test_where_lengths_and_offsets_stand(samples):
     ("target", "inputs"),
     [
         *((Methods, 300), (Messages, 1000), (Viewer, 200), (Writers, 60)),
-        *((Forms, 300), (Results, 60), (Plans, 100), (Locating, 6)),
+        *((Forms, 300), (Results, 60), (Plans, 100), (Locating, 6), (Readers, 250)),
     ],
     ids=lambda value: getattr(value, "__name__", value),
 )
+@pytest.mark.usefixtures("folders")
 def test_inputs_of_each_kind(target, inputs, tmp_path):
     made = target(tmp_path)
     with closing(made):

@@ -6,9 +6,7 @@ middle or the last beam, with the time of each beam or of a turn alone.
 
 import json
 import math
-import struct
 from itertools import product
-from types import SimpleNamespace as Message
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +36,7 @@ ROOM = World([[*a, *b] for a, b in zip(RING, [*RING[1:], RING[0]], strict=True)]
 TWIST, START, NANO, RATE = (0.8, -0.2, 0.9), (-1.5, -1.0, 0.3), 1_000_000_000, 10.0
 #: A time that no float holds [ns].
 EPOCH = 1_700_000_000_123_456_789
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
 #: Field of view and step [rad]: with a gap at the back, all around, all around without a seam.
 VIEWS = ((1.5 * math.pi, 1080), (2 * math.pi - 0.3, 1380), (2 * math.pi, 1440))
 
@@ -80,22 +79,16 @@ class Scanner(NamedTuple):
         ranges, _ = cast_rays(ROOM, poses, -bearings if self.is_upside_down else bearings)
         seed = scan, self.is_clockwise, self.is_upside_down, len(self.stamp), self.has_increment
         ranges += sigma * np.random.default_rng(seed).standard_normal(n)
-        seconds, nanoseconds = divmod(EPOCH + round(scan * NANO / RATE), NANO)
-        return Message(
-            header=Message(stamp=Message(sec=seconds, nanosec=nanoseconds), frame_id="laser"),
-            angle_min=float(bearings[0]), angle_max=float(bearings[-1]), angle_increment=step,
-            time_increment=increment if self.has_increment else 0.0, scan_time=1 / RATE,
-            range_min=0.0, range_max=30.0, ranges=ranges, intensities=[],
-        )  # fmt: skip
+        stamp = divmod(EPOCH + round(scan * NANO / RATE), NANO)
+        geometry = float(bearings[0]), float(bearings[-1]), step
+        times = increment if self.has_increment else 0.0, 1 / RATE
+        values = np.float32(ranges), np.zeros(0, np.float32)
+        new = ros_bags.Messages(2).new
+        return new(LASER_SCAN, (stamp, "laser"), *geometry, *times, 0.0, 30.0, *values)
 
     def data(self, scan, sigma=0.0):
         """The same in CDR."""
-        m = self.message(scan, sigma)
-        stamp, n = m.header.stamp, len(m.ranges)
-        head = struct.pack("<iII6s2x", stamp.sec, stamp.nanosec, 6, b"laser\0")
-        numbers = (m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time)
-        body = struct.pack("<7fI", *numbers, m.range_min, m.range_max, n)
-        return b"\0\1\0\0" + head + body + m.ranges.astype("<f4").tobytes() + bytes(4)
+        return bytes(ros_bags.store(2).serialize_cdr(self.message(scan, sigma), LASER_SCAN))
 
 
 ALL = [

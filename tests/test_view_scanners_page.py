@@ -1,20 +1,15 @@
 """The page of `view` in headless Chromium, of a log of several scanners."""
 
 import pytest
-from test_merge_command import MOUNTINGS, made
+from test_merge_command import made
 from test_view_page import PLACE, browser, pytestmark, served, shown
+from test_view_scanners import FRONT, REAR, log
 
 from lineament import Extractor
 from lineament.explain.explain import explain
 from lineament.logs import open_log
 
-__all__ = ["browser", "pytestmark"]
-FRONT, REAR = MOUNTINGS
-
-
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    return made(tmp_path_factory.mktemp("log"))
+__all__ = ["browser", "log", "pytestmark"]
 
 
 @pytest.fixture

@@ -18,7 +18,6 @@ from lineament.output import open_writer
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)
-LAYERS = ["segments", "arcs", "corners", "edges", "ellipses"]
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
@@ -74,10 +73,6 @@ def read_ros2(path):
 both = pytest.mark.parametrize(
     ("name", "read"), [("a.mcap", read_foxglove), ("a.ros2.mcap", read_ros2)]
 )
-
-
-def points_of(points):
-    return np.array([(p.get("x", 0.0), p.get("y", 0.0)) for p in points])
 
 
 @both
@@ -158,13 +153,13 @@ def plain(value):
     return plain(value.tolist()) if isinstance(value, np.ndarray) else value
 
 
-@pytest.mark.parametrize(("ending", "read"), [(".mcap", read_foxglove), (".ros2.mcap", read_ros2)])
-def test_recordings_hold_what_was_approved(tmp_path, ending, read):
+@both
+def test_recordings_hold_what_was_approved(tmp_path, name, read):
     """A scan of each kind: with a pose and without, regular or not, with what it shows of each."""
     scan = scan_of(intensities=[1.0, 2.0, 3.0, 4.0, 5.0, 6.5])
     uneven = scan_of(pose=None, stamp=13.0, angles=[-0.5, -0.4, -0.1, 0.0, 0.2, 0.7])
-    path = write(tmp_path / f"a{ending}", (FOUND, scan), (EMPTY, uneven))
+    path = write(tmp_path / name, (FOUND, scan), (EMPTY, uneven))
     lines = []
     for topic, time, message in read(path):
         lines += [f"{topic} at {time}", *numbers_of(plain(message))]
-    assert_approved(f"messages{ending}", lines)
+    assert_approved(f"messages{name[1:]}", lines)

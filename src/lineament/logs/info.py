@@ -4,7 +4,6 @@ import math
 import statistics
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 import numpy as np
 
@@ -12,14 +11,13 @@ from ..errors import one_line
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask
+from ..scan.fields import date_of
 from ..scan.units import FAR
 from .base import Log, Topic
 from .own import OwnParts
 
 #: How many frames, topics and kinds of messages are listed.
 _FRAMES, _TOPICS, _LISTED = 16, 32, 20
-#: Stamps between these are seconds since 1970, and make a date (1990 to 2100).
-_LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 #: Stamps make a rate when at least this share of their steps goes forward, and at most that share
 #: backwards: two clocks have no common rate.
 _FORWARD, _BACKWARD = 0.5, 0.1
@@ -93,8 +91,8 @@ class TopicInfo:
             parts.append(f"{self.rate:.4g} Hz")
         elif not self.backwards and self.scans > 1:
             parts.append("no rate: most stamps stand still")
-        if _LONG_AGO <= self.start < _FAR_OFF:
-            parts.insert(0, f"{datetime.fromtimestamp(self.start, UTC):%Y-%m-%d %H:%M:%S} UTC")
+        if date := date_of(self.start):
+            parts.insert(0, date)
         if self.backwards:
             parts.append(f"{self.backwards} stamps run backwards")
         return ", ".join(parts)

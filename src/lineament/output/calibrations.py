@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..motion.calibration import Calibration
 from ..scan import Array
 from . import canvas
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LABELS = ("forward [mm]", "to the left [mm]", "turn [°]")
 _SCALES = (1e3, 1e3, 180 / np.pi)
@@ -21,16 +17,12 @@ _SCALES = (1e3, 1e3, 180 / np.pi)
 def plot_calibration(
     found: Calibration, stamps: Array, path: str | os.PathLike[str], *, title: str = ""
 ) -> None:
-    """Write the picture that `calibration_figure` makes to a ``.png``, ``.svg`` or ``.pdf``."""
-    canvas.check_ending(path)
-    canvas.save(calibration_figure(found, stamps, title=title), path)
-
-
-def calibration_figure(found: Calibration, stamps: Array, *, title: str = "") -> Figure:
     """Draw what is left of each step at its stamp [s], with two deviations of its noise.
 
-    Steps that were left out as slips are crosses; those far outside are drawn at the border.
+    Steps that were left out as slips are crosses; those far outside are drawn at the border. The
+    picture is a ``.png``, ``.svg`` or ``.pdf``.
     """
+    canvas.check_ending(path)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 6.5)
     panels, time = figure.subplots(3, 1, sharex=True), stamps - stamps[0]
     kept = ~found.is_slip
@@ -45,4 +37,4 @@ def calibration_figure(found: Calibration, stamps: Array, *, title: str = "") ->
     slips = int(found.is_slip.sum())
     panels[0].set_title(f"{title} · {len(kept)} steps, {slips} left out (crosses); band: ± 2 σ")
     panels[-1].set_xlabel("time [s]")
-    return figure
+    canvas.save(figure, path)

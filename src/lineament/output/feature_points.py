@@ -14,8 +14,7 @@ from ..features.records import FIELDS, POINTS, numbers, text_codes
 if TYPE_CHECKING:
     from ..motion import Tracks
 
-#: Values of the field `kind`.
-SEGMENT_POINT, CORNER_POINT, ARC_POINT, EDGE_POINT = range(4)
+#: Tables that have points, in the order of the values of the field `kind`.
 _TABLES = ("segments", "corners", "arcs", "edges")
 #: Types of the fields of a point.
 _FORMS = {"z": "<f4", "kind": "<u4", "track": "<i4"} | {

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import Array, LaserScan, Pose
+from ..scan.fields import date_of
 from . import canvas, drawing
 from .canvas import count
 from .markers import Markers, markers_of
@@ -34,17 +34,13 @@ _WAYS: dict[str, tuple[str, float, str]] = {
     "direction unobserved": ("arc", 3.0, "-"),
     "not located": ("corner", 1.8, ":"),
 }
-#: A stamp is a date from 1990 to 2100 [s].
-_LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 
 
 def scan_title(log: str | os.PathLike[str], index: int, scan: LaserScan, topic: str = "") -> str:
     """Return a title of a picture: log, scan, its topic if given, and the time of the scan."""
     parts = [Path(str(log).rstrip("/")).name, f"scan {index}", *([topic] if topic else [])]
-    if _LONG_AGO <= scan.stamp < _FAR_OFF:
-        parts.append(f"{datetime.fromtimestamp(scan.stamp, UTC):%Y-%m-%d %H:%M:%S} UTC")
-    elif scan.stamp:
-        parts.append(f"{scan.stamp:.2f} s")
+    if scan.stamp:
+        parts.append(date_of(scan.stamp) or f"{scan.stamp:.2f} s")
     return " · ".join(parts)
 
 
@@ -216,16 +212,14 @@ def numbered(features: Features) -> NDArray[np.void]:
     return kept
 
 
-def corner_figure(
-    scan: LaserScan, features: Features, corner: int, *, title: str = "", dark: bool = False
-) -> Figure:
+def corner_figure(scan: LaserScan, features: Features, corner: int, *, title: str = "") -> Figure:
     """Draw the surroundings of a corner, by its index, so large that its ellipse can be seen."""
     x, y = features.corners["position"][corner].tolist()
     sigma = math.sqrt(max(float(np.trace(features.corners["covariance"][corner])), 0.0))
     reach = float(np.clip(36 * sigma, 0.05, 2.0)) if math.isfinite(sigma) else 0.5
     points = np.array([(x - reach, y - reach), (x + reach, y + reach)])
     name, error = f"Corner at ({x:.3f}, {y:.3f}) m", f"1 σ of its position: {1e3 * sigma:.1f} mm"
-    return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, dark, None)
+    return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, False, None)
 
 
 def map_figure(

@@ -1,6 +1,7 @@
 """The fields of a scan and of its noise, as they are given: checked, and copied."""
 
 import math
+from datetime import UTC, datetime
 from numbers import Real
 from typing import Any
 
@@ -27,6 +28,8 @@ DEGREES = ": are they in degrees? (numpy.radians)"
 LONGEST = 50.0
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
+#: Stamps between these are seconds since 1970, and make a date (1990 to 2100).
+_LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 
 
 def number(name: str, value: object) -> float:
@@ -282,6 +285,13 @@ def nanoseconds(stamp: float) -> int:
     """Nanoseconds of a stamp [s], without the rounding of a product."""
     seconds = math.floor(stamp)
     return seconds * NANO + round((stamp - seconds) * NANO)
+
+
+def date_of(stamp: float) -> str:
+    """Write a stamp [s] as a date, if it makes one from 1990 to 2100; else it is ""."""
+    if not _LONG_AGO <= stamp < _FAR_OFF:
+        return ""
+    return f"{datetime.fromtimestamp(stamp, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def message_fields(message: Any) -> tuple[dict[str, Any], int | None]:

@@ -54,13 +54,12 @@ def warn_of_whole_numbers(ranges: object) -> None:
 
 def why_invalid(ranges: Array, range_min: float, range_max: float) -> str:
     """Return what is wrong with ranges of which none is valid; "" if no beam returned anything."""
-    finite = ranges[(ranges > 0) & (ranges < CODES)]
-    if not len(finite):
-        return doubt(ranges, range_min, range_max)
-    limits = f"{range_min:g} to {range_max:g} m"
-    return doubt(ranges, range_min, range_max) or (
-        f"they are {finite.min():g} to {finite.max():g} m, outside of the limits of {limits}; "
-        "scale=... where that is another unit"
+    finite, problem = ranges[(ranges > 0) & (ranges < CODES)], doubt(ranges, range_min, range_max)
+    if problem or not len(finite):
+        return problem
+    return (
+        f"they are {finite.min():g} to {finite.max():g} m, outside of the limits of "
+        f"{range_min:g} to {range_max:g} m; scale=... where that is another unit"
     )
 
 
