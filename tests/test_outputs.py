@@ -11,7 +11,7 @@ from test_cli import save_benchmark
 from test_output import files_up_to, resource
 
 import lineament as ln
-from lineament import LineamentError
+from lineament import LineamentError, LineamentWarning
 from lineament.cli import cli, run
 from lineament.cli.options import Place
 from lineament.files import check_outputs, spare_inputs, written_beside
@@ -19,6 +19,7 @@ from lineament.logs import open_log, save_log
 from lineament.mapping import LineMap
 from lineament.simulation import SENSORS, drive, room, scene
 from lineament.tasks.extract import extract_log
+from lineament.tasks.mapping import tum_written
 
 
 def names_of(folder):
@@ -285,6 +286,16 @@ def test_a_log_is_not_saved_over_itself_while_it_is_read(files, ending):
     assert path.read_bytes() == before
     save_log(path, list(open_log(path))[:2])  # on purpose
     assert len(open_log(path)) == 2
+
+
+def test_poses_without_times_are_warned_of(tmp_path):
+    path, poses = tmp_path / "a.tum", [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    said = pytest.warns(LineamentWarning, match="all rows have the stamp 0, as the scans")
+    with said, tum_written(path, [0.0, 0.0], poses):
+        pass
+    with tum_written(path, [0.0, 1.0], poses):
+        pass
+    assert len(path.read_text().splitlines()) == 2
 
 
 def test_a_file_that_is_read_only_stays(tmp_path, monkeypatch):

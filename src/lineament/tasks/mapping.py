@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import LineamentError, LogError, needed_by, one_line
+from ..errors import LineamentError, LogError, needed_by, one_line, warn
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, naming_errors, written_beside
 from ..logs import open_log
@@ -228,8 +228,11 @@ def tum_written(
 ) -> Iterator[None]:
     """Write stamps [s] and poses as lines of ``stamp x y z qx qy qz qw``, whole or not at all.
 
-    The file gets its name when the block ends; if it ends by an exception, none appears.
+    The file gets its name when the block ends; if it ends by an exception, none appears. Several
+    rows that all have one stamp are a `LineamentWarning`.
     """
+    if len(stamps) > 1 and len({*stamps}) == 1:
+        warn(f"{path}: all rows have the stamp {stamps[0]:g}, as the scans of the log have")
     lines = []
     for stamp, (x, y, theta) in zip(stamps, poses, strict=True):
         z, w = math.sin(theta / 2), math.cos(theta / 2)
