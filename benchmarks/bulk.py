@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from lineament_lab.reproduce.machine import machine
+from recordings import DATA
 
 import lineament as ln
 from lineament.logs import open_log
@@ -31,7 +31,6 @@ from lineament.tasks.extract import extract_log
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import ros_bags
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 RECORDINGS = (
     "carmen/intel-corrected.log.gz",
     "graph/intel-lab.log.gz",

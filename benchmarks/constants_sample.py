@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,7 +37,6 @@ from lineament import Extractor, LaserScan, LogError
 from lineament.logs import find_logs
 from lineament.simulation import SENSORS
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 KINDS = ("room", "corridor", "hall")
 #: Seed of the scenes, behind those that are reported.
 SEED = 7

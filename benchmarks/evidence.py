@@ -14,12 +14,12 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from pathlib import Path
 from typing import NamedTuple
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from recordings import DATA, logs
 
 import lineament as ln
 from lineament.logs import open_log
@@ -32,15 +32,8 @@ from lineament.mapping.making import make_map
 from lineament.scan import Pose
 from lineament.scan.poses import compose, relative
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
-LOGS = {
-    "ACES": "carmen/aces-corrected.log.gz",
-    "fr079": "truth/fr079_graph.npz",
-    "CSAIL": "carmen/csail-corrected.log.gz",
-    "Intel lab": "truth/intel_graph.npz",
-    "Acapulco": "carmen/acapulco-corrected.log.gz",
-    "Killian": "graph/killian.g2o.zip",
-}
+#: The map of another log is that of the next one.
+LOGS = logs("ACES", "fr079", "CSAIL", "Intel lab", "Acapulco", "Killian")
 #: Logs by whose first halves constants are chosen.
 FITTED = "ACES", "fr079", "CSAIL"
 #: Way of a local map, and between two of them; a gap in a log [m].

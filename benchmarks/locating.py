@@ -23,6 +23,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from recordings import DATA
 
 import lineament as ln
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
@@ -221,7 +222,7 @@ ARENA = (("standing", "static_data"), ("moving", "mocap_02171554"))
 
 def arena_of(file: str) -> tuple[np.lib.npyio.NpzFile, list[ln.LaserScan]] | None:
     """Return a recording of the arena: its archive and its scans; None where it is not there."""
-    path = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"), "truth", f"jackal_{file}.npz")
+    path = DATA / "truth" / f"jackal_{file}.npz"
     return (np.load(path), list(ln.open_log(path))) if path.exists() else None
 
 

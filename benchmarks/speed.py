@@ -17,12 +17,11 @@ from pathlib import Path
 import numba
 import numpy as np
 from lineament_lab.reproduce.machine import machine
+from recordings import DATA
 
 import lineament as ln
 from lineament.simulation import SENSORS, building, drive
 from lineament.tasks.extract import extract_log
-
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 
 
 def median_seconds(call: Callable[[], object], least: float = 0.2, repetitions: int = 7) -> float:
