@@ -19,12 +19,12 @@ from typing import NamedTuple
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from mapping import drive
 from recordings import DATA, logs
 
 import lineament as ln
 from lineament.logs import open_log
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
-from lineament.mapping.drive_map import Drive
 from lineament.mapping.evidence import OF_MAPS, RIGHT_ON_MAP, WRONG_ON_MAP, evidence_of
 from lineament.mapping.locate import _TIGHT as TIGHT
 from lineament.mapping.locate import voted
@@ -75,10 +75,9 @@ def nearest(poses: list[Pose], to: Pose) -> int:
 
 
 def mapped(scans: list[ln.LaserScan], every: int = 1) -> Mapped:
-    drive, extract, scans = Drive(), ln.Extractor(), scans[::every]
-    for scan in scans:
-        drive.add(scan, extract(scan), scan.pose)
-    made = make_map(drive.frames, drive.scans)
+    scans = scans[::every]
+    found = drive(scans, odometry=True)
+    made = make_map(found.frames, found.scans)
     return Mapped(made.map, made.poses, [scan.pose for scan in scans], every)
 
 

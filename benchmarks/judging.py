@@ -154,7 +154,7 @@ def real() -> None:
     """
     for name in ("ACES", "Intel lab"):
         scans = list(open_log(DATA / LOGS[name]))
-        plan, at, _ = mapped(scans[::2])
+        plan, at, *_ = mapped(scans[::2])
         follower, judge, extract = Follower(plan), Judge(plan), ln.Extractor()
         rng, there, counts = np.random.default_rng(0), len(at), {False: Counter(), True: Counter()}
         for k, scan in enumerate(scans[: 2 * there - 1]):

@@ -188,6 +188,11 @@ def loops_off(found, made, truth):
     return np.array(off).reshape(-1, 3)
 
 
+def wrong_loops(off):
+    """Whether each loop is off by more than 0.2 m or 1°."""
+    return (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
+
+
 def nees(made, truth, segments):
     """Squares of offset and angle of walls off the true ones (n, 2), over their variances."""
     lines, found = segments[:, 2:] - segments[:, :2], []
@@ -214,10 +219,9 @@ def against_truth(found, made, truth, segments):
 
 def print_truth(off, spans, squares):
     """Print what is known of simulated storeys alone."""
-    wrong = (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
     mean, median = squares.mean(axis=0), np.median(squares, axis=0)
     print(
-        f"<!-- {len(off)} loops, {wrong.sum()} wrong; spans over 10 m off by "
+        f"<!-- {len(off)} loops, {wrong_loops(off).sum()} wrong; spans over 10 m off by "
         f"{100 * np.std(spans):.4f} %, at most {100 * abs(spans).max():.4f} %; squares of "
         f"{len(squares)} walls over their variances: offsets {mean[0]:.2f} (median "
         f"{median[0]:.2f}), angles {mean[1]:.2f} ({median[1]:.2f}) -->",
