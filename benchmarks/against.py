@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from recordings import DATA
 
 ROOT = Path(__file__).parents[1]
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 SENSORS = ("paper", "utm30lx", "noisy", "rplidar", "lms361")
 #: Of each log so many scans are taken, spread over its first ones.
 LOGS = (

@@ -6,11 +6,9 @@ and the time of a scan; `--quick` measures a tenth. A figure that misses its lim
 
 import argparse
 import math
-import os
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -30,12 +28,12 @@ from lineament_lab.reproduce.scans import (
     simulated_frames,
     time_ratio,
 )
+from recordings import DATA
 
 from lineament import Extractor, Features, LaserScan, RangeNoise
 from lineament.methods.optimal import Optimal
 from lineament.simulation import SENSORS, Sensor
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: Method and constants were tuned on scenes of the seeds 0 and 1.
 SEEDS, SCENES = range(3, 8), 120
 #: Repetitions of a call, and scans of a batch for one and two threads.

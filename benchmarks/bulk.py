@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from lineament_lab.reproduce.machine import machine
+from recordings import DATA
+from speed import arithmetic, in_turns
 
 import lineament as ln
 from lineament.logs import open_log
@@ -31,7 +32,6 @@ from lineament.tasks.extract import extract_log
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import ros_bags
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 RECORDINGS = (
     "carmen/intel-corrected.log.gz",
     "graph/intel-lab.log.gz",
@@ -68,25 +68,6 @@ def write(path: Path, scans: list[ln.LaserScan], repeat: int) -> Path:
             yield "/scan", i * 25_000_000, message
 
     return ros_bags.write(path.parent, "mcap", items(), path.stem)
-
-
-def arithmetic(n: int) -> float:
-    """Work that needs nothing but a processor: what two workers can gain at all, here and now."""
-    total = 0.0
-    for i in range(n):
-        total += (i * 0.5) % 3.0
-    return total
-
-
-def in_turns(calls: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Times of the calls, one after the other: the machine's moods meet all."""
-    times: dict[str, list[float]] = {name: [] for name in calls}
-    for _ in range(rounds):
-        for name, call in calls.items():
-            started = time.perf_counter()
-            call()
-            times[name].append(time.perf_counter() - started)
-    return times
 
 
 def gain(logs: list[Path], folder: Path, scans: int, rounds: int) -> None:

@@ -26,7 +26,8 @@ from typing import Any
 os.environ["LINEAMENT_JIT"] = "1"
 
 import numpy as np
-from constants_sample import DATA, figures, measure, resampled, take_sample
+from constants_sample import figures, measure, resampled, take_sample
+from recordings import DATA
 
 from lineament import Extractor
 from lineament.features.records import SLIT

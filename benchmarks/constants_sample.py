@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -35,10 +34,9 @@ from lineament_lab.reproduce.scans import (
 )
 
 from lineament import Extractor, LaserScan, LogError
-from lineament.logs import find_logs
+from lineament.logs import find_logs, open_log
 from lineament.simulation import SENSORS
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 KINDS = ("room", "corridor", "hall")
 #: Seed of the scenes, behind those that are reported.
 SEED = 7
@@ -69,7 +67,7 @@ def take_sample(scenes: int, scans: int, data: Path) -> Sample:
     for path in map(Path, find_logs(data)):
         name = path.relative_to(data).as_posix()
         try:
-            sample.recorded[name] = spread_scans(path, scans)
+            sample.recorded[name] = spread_scans(open_log(path, keep_going=True), scans)
         except LogError:
             continue
         if pairs := still_pairs(path, 3 * scans, standing=name in STANDING):

@@ -7,11 +7,11 @@ as nav2_bringup/maps.
 """
 
 import argparse
-import os
 from pathlib import Path
 from random import Random
 
 from matplotlib.collections import LineCollection
+from recordings import DATA
 
 from lineament import Extractor, open_log
 from lineament.errors import LineamentError
@@ -21,7 +21,6 @@ from lineament.output.figures import scan_title, scans_figure
 from lineament.output.stages import trace_figure
 from lineament.walls import lengths_of
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: Scans that are drawn, by the number that `lineament plot --scan` takes: first those at which
 #: faults were seen, then one of each further recording.
 SHEET = (

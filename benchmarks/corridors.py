@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from recordings import DATA, logs
 
 from lineament import Extractor
 from lineament.logs import open_log
@@ -32,14 +31,8 @@ CHANGES, SLOWEST, FASTEST = 0.02, 0.15, 1.1
 DEPTH, WIDTH, ROUGH = 0.12, 0.9, 0.01
 
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
-LOGS = {
-    "fr079": "truth/fr079_graph.npz",
-    "ACES": "carmen/aces-corrected.log.gz",
-    "arena": "truth/jackal_mocap_02171554.npz",
-    "Acapulco": "carmen/acapulco-corrected.log.gz",
-    "Killian": "graph/killian.g2o.zip",
-}
+ARENA = {"arena": "truth/jackal_mocap_02171554.npz"}
+LOGS = logs("fr079", "ACES") | ARENA | logs("Acapulco", "Killian")
 #: Times over which changes of speed are averaged [s]; slower, a robot stands [m/s].
 TIMES, STANDING = (1.0, 2.0, 4.0, 8.0), 0.1
 COLUMNS = (

@@ -21,7 +21,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from live import memory_of, wait_for, wait_until
+from live import memory_of, start_node, wait_for, wait_until
 from live_driving import cdr_scan, garbage
 
 DOMAIN, RATE = 78, 40
@@ -114,10 +114,7 @@ def day(count: int, seconds: float) -> str:
     """Send so many scans, or those of some time, to a node; the table of what came of it."""
     with tempfile.TemporaryDirectory() as name:
         log = Path(name) / "node.log"
-        command = [sys.executable, "-m", "lineament", "live", "--localhost", "--track"]
-        command += ["--domain", str(DOMAIN), "--reliability", "reliable"]
-        with log.open("w") as out:
-            node = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
+        node = start_node(log, DOMAIN, "--track", "--reliability", "reliable")
         try:
             wait_for(log, "finds features")
             found = Day(Ends(SCANNERS + GARBLERS), node.pid)

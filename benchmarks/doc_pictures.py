@@ -5,15 +5,14 @@ and Xvfb (Debian: xvfb mesa-vulkan-drivers) for the screenshot of rerun.
 """
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 from PIL import Image
+from recordings import DATA
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: The log and the scan of docs/python.md, and the log of the screenshot.
 SCAN = ("graph/killian.g2o.zip", 1890)
 LOG = "rosbag1/jackal_mocap.bag"

@@ -14,17 +14,17 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from pathlib import Path
 from typing import NamedTuple
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from mapping import drive
+from recordings import DATA, logs
 
 import lineament as ln
 from lineament.logs import open_log
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
-from lineament.mapping.drive_map import Drive
 from lineament.mapping.evidence import OF_MAPS, RIGHT_ON_MAP, WRONG_ON_MAP, evidence_of
 from lineament.mapping.locate import _TIGHT as TIGHT
 from lineament.mapping.locate import voted
@@ -32,15 +32,8 @@ from lineament.mapping.making import make_map
 from lineament.scan import Pose
 from lineament.scan.poses import compose, relative
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
-LOGS = {
-    "ACES": "carmen/aces-corrected.log.gz",
-    "fr079": "truth/fr079_graph.npz",
-    "CSAIL": "carmen/csail-corrected.log.gz",
-    "Intel lab": "truth/intel_graph.npz",
-    "Acapulco": "carmen/acapulco-corrected.log.gz",
-    "Killian": "graph/killian.g2o.zip",
-}
+#: The map of another log is that of the next one.
+LOGS = logs("ACES", "fr079", "CSAIL", "Intel lab", "Acapulco", "Killian")
 #: Logs by whose first halves constants are chosen.
 FITTED = "ACES", "fr079", "CSAIL"
 #: Way of a local map, and between two of them; a gap in a log [m].
@@ -82,10 +75,9 @@ def nearest(poses: list[Pose], to: Pose) -> int:
 
 
 def mapped(scans: list[ln.LaserScan], every: int = 1) -> Mapped:
-    drive, extract, scans = Drive(), ln.Extractor(), scans[::every]
-    for scan in scans:
-        drive.add(scan, extract(scan), scan.pose)
-    made = make_map(drive.frames, drive.scans)
+    scans = scans[::every]
+    found = drive(scans, odometry=True)
+    made = make_map(found.frames, found.scans)
     return Mapped(made.map, made.poses, [scan.pose for scan in scans], every)
 
 

@@ -4,17 +4,16 @@ Run: python benchmarks/gallery.py, with LINEAMENT_DATA.
 """
 
 import io
-import os
 from pathlib import Path
 
 from matplotlib.figure import Figure
 from PIL import Image
+from recordings import DATA
 
 from lineament import Extractor, open_log, plot
 from lineament.output.canvas import figure_bytes, new_figure
 from lineament.output.figures import map_figure
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
 #: Name of each picture, its log, and its scan; without one it is the map of the whole drive.
 PICTURES = {

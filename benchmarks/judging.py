@@ -27,8 +27,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from evidence import DATA, LOGS, mapped
+from evidence import LOGS, mapped
 from grids import grid_of, viewpoints
+from recordings import DATA
 
 import lineament as ln
 from lineament.logs import open_log
@@ -71,16 +72,25 @@ def believed(truth: list[Pose], wheels: list[Pose], rng: np.random.Generator) ->
 
 
 def judged(seed: int, sensor: str, rate: float) -> list[Found]:
-    """Drive through one storey, on two plans of it: grids of 5 cm, as AMCL has them."""
+    """Drive through one storey, on two plans of it."""
+    return [_driven(*of_plan, seed, sensor, rate) for of_plan in on_plans(seed)]
+
+
+def on_plans(seed: int) -> Iterator[tuple[Building, str, LineMap]]:
+    """Yield a storey, and what is known of it: grids of 5 cm, as robots have them."""
     storey = office(seed, (40.0, 24.0))
     at = viewpoints(storey)
-    walls, furnished = (
-        LineMap.from_grid(grid_of(world, at)) for world in (storey.plan, storey.world)
-    )
-    return [
-        _driven(storey, "walls alone", walls, seed, sensor, rate),
-        _driven(moved(storey, seed), "furniture, a third moved", furnished, seed, sensor, rate),
-    ]
+    yield storey, "walls alone", LineMap.from_grid(grid_of(storey.plan, at))
+    furnished = LineMap.from_grid(grid_of(storey.world, at))
+    yield moved(storey, seed), "furniture, a third moved", furnished
+
+
+def drive_through(
+    building: Building, seed: int, sensor: str, rate: float, **options: bool
+) -> tuple[Iterator[ln.LaserScan], list[Pose]]:
+    """Return the scans of a drive among people, with poses by the wheels, and the true poses."""
+    among = {"people": PEOPLE, "wheels": Wheels(), **options}
+    return building.drive(SENSORS[sensor], seed=seed, speed=SPEED, rate=rate, **among)
 
 
 def moved(storey: Building, seed: int, share: float = 1 / 3) -> Building:
@@ -97,8 +107,7 @@ def _driven(
     world: Building, name: str, plan: LineMap, seed: int, sensor: str, rate: float
 ) -> Found:
     rng = np.random.default_rng([seed, 77])
-    options = {"seed": seed, "speed": SPEED, "rate": rate, "wheels": Wheels(), "people": PEOPLE}
-    scans, truth = world.drive(SENSORS[sensor], **options)
+    scans, truth = drive_through(world, seed, sensor, rate)
     scans = list(scans)
     wheels = [scan.pose for scan in scans]
     extract, follower, judge = ln.Extractor(), Follower(plan), Judge(plan)
@@ -145,7 +154,7 @@ def real() -> None:
     """
     for name in ("ACES", "Intel lab"):
         scans = list(open_log(DATA / LOGS[name]))
-        plan, at, _ = mapped(scans[::2])
+        plan, at, *_ = mapped(scans[::2])
         follower, judge, extract = Follower(plan), Judge(plan), ln.Extractor()
         rng, there, counts = np.random.default_rng(0), len(at), {False: Counter(), True: Counter()}
         for k, scan in enumerate(scans[: 2 * there - 1]):

@@ -20,15 +20,15 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
-from evidence import DATA, LOGS, mapped
-from grids import grid_of, viewpoints
-from judging import PEOPLE, SOON, SPEED, moved
+from evidence import LOGS, mapped
+from judging import SOON, drive_through, on_plans
+from recordings import DATA
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig
@@ -42,7 +42,7 @@ from lineament.mapping.following import Follower
 from lineament.rosmsg.poses import StampedPose
 from lineament.scan import LaserScan, Pose
 from lineament.scan.poses import compose, relative
-from lineament.simulation import SENSORS, Building, Wheels, office
+from lineament.simulation import Building
 
 #: The robot is carried away each so many seconds, so far at least [m].
 EACH, FAR = 30.0, 2.0
@@ -70,27 +70,15 @@ class Driven(NamedTuple):
 
 
 def kidnapped(seed: int, sensor: str, rate: float, times: int) -> list[Found]:
-    """Carry a robot away in one storey, on two plans of it: grids of 5 cm, as of robots."""
-    storey = office(seed, (40.0, 24.0))
-    at = viewpoints(storey)
-    walls, furnished = (
-        LineMap.from_grid(grid_of(world, at)) for world in (storey.plan, storey.world)
-    )
-    return [
-        found
-        for name, building, plan in (
-            ("walls alone", storey, walls),
-            ("furniture, a third moved", moved(storey, seed), furnished),
-        )
-        for found in _kidnapped(building, name, plan, seed, sensor, rate, times)
-    ]
+    """Carry a robot away in one storey, on two plans of it."""
+    drives = (_kidnapped(*of_plan, seed, sensor, rate, times) for of_plan in on_plans(seed))
+    return list(chain.from_iterable(drives))
 
 
 def _kidnapped(
     building: Building, name: str, plan: LineMap, seed: int, sensor: str, rate: float, times: int
 ) -> Iterator[Found]:
-    options = {"seed": seed, "speed": SPEED, "rate": rate, "wheels": Wheels(), "people": PEOPLE}
-    scans, truth = building.drive(SENSORS[sensor], moving=True, **options)
+    scans, truth = drive_through(building, seed, sensor, rate, moving=True)
     way = [Driven(scan, scan.pose, true) for scan, true in zip(scans, truth, strict=True)]
     rng, n = np.random.default_rng([seed, 79]), round(EACH * rate)
     robot, at, was_right = Robot(plan), -1, False

@@ -74,10 +74,13 @@ def row(found: dict[str, Any], rate: float, topics: str) -> str:
     )
 
 
-def start_node(folder: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "lineament", "live", "--localhost", "--domain", str(DOMAIN)]
-    log = (folder / "node.log").open("w")
-    return subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, text=True)
+def start_node(log: Path, domain: int, *options: str) -> subprocess.Popen[str]:
+    """Start a node whose output goes to a file."""
+    command = [sys.executable, "-m", "lineament", "live", "--localhost", "--domain", str(domain)]
+    with log.open("w") as out:
+        return subprocess.Popen(
+            [*command, *options], stdout=out, stderr=subprocess.STDOUT, text=True
+        )
 
 
 def start_role(role: str, *arguments: str) -> subprocess.Popen[str]:
@@ -88,7 +91,7 @@ def run(rate: float, seconds: float, topics: str, samples: int = 0) -> dict[str,
     """Publish at a rate for some time; what came of it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        node = start_node(folder)
+        node = start_node(folder / "node.log", DOMAIN)
         wait_for(folder / "node.log", "finds features")
         listener = start_role("listen", "--topics", topics, "--out", str(folder / "heard.npy"))
         count = int(rate * seconds)
@@ -138,7 +141,7 @@ def cold_start() -> float:
             wait_until((folder / f"sent{i}.npy.ready").exists)
             time.sleep(1.0)
             begun = time.monotonic_ns()
-            node = start_node(folder)
+            node = start_node(folder / "node.log", DOMAIN)
             publisher.wait()
             for process in (listener, node):
                 process.send_signal(signal.SIGTERM)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from lineament_lab.evaluation.maps import absolute_errors
-from mapping import loops_off
+from mapping import loops_off, wrong_loops
 from moving_picture import BEAM, LOST, ROBOT, SEEN, WALL, Film
 from moving_picture import moved as placed
 
@@ -117,15 +117,14 @@ def main() -> None:
     made = mapper.finish()
     print(f"{made.map}, {made.parts.count} part(s), made in {time.perf_counter() - at:.1f} s")
     loops = loops_off(mapper.drive, made, truth)
-    wrong = (np.hypot(loops[:, 0], loops[:, 1]) > 0.2) | (abs(loops[:, 2]) > math.radians(1))
     kinds = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
     memory = [f"{resource.getrusage(of).ru_maxrss / 1024:.0f} MB" for of in kinds]
     p50, p99 = np.quantile(used, (0.5, 0.99))
     print(
         f"{sum(made.ways):.0f} m, not sure on {sum(of for *_, of in made.unsure):.1f} m; ATE "
         f"{absolute_errors(made.poses, truth).summary()['way_rmse']:.3f} m; {len(loops)} loops, "
-        f"{wrong.sum()} wrong; a scan takes {p50:.2f} ms of processor, 99 % at most {p99:.1f} ms; "
-        f"memory {memory[0]}, the process beside it {memory[1]}"
+        f"{wrong_loops(loops).sum()} wrong; a scan takes {p50:.2f} ms of processor, 99 % at most "
+        f"{p99:.1f} ms; memory {memory[0]}, the process beside it {memory[1]}"
     )
     if chosen.picture:
         film(chosen.picture, pictures, made, way, truth[0])

@@ -23,6 +23,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from recordings import DATA
 
 import lineament as ln
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
@@ -168,10 +169,8 @@ def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
             started = time.process_time()
             where = locate(place.query, plan)
             spent = time.process_time() - started
-            off = np.subtract(where.pose, place.truth)
-            off[2] = math.remainder(off[2], 2 * math.pi)
-            way = math.hypot(off[0], off[1])
-            right = way < RIGHT[0] and abs(off[2]) < RIGHT[1] and number < 3
+            off = off_by(where.pose, place.truth)
+            way, right = math.hypot(off[0], off[1]), is_right(off) and number < 3
             nees = off @ np.linalg.solve(where.covariance, off) / 3
             rows.append((
                 number, VERDICTS.index(where.verdict), right, place.unique, way, abs(off[2]), nees,
@@ -179,6 +178,17 @@ def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
                 where.evidence.contradicted, place.way, seed, len(plan), place.mirrored,
             ))  # fmt: skip
     return np.array(rows)
+
+
+def off_by(found: tuple[float, ...], true: tuple[float, ...] | np.ndarray) -> np.ndarray:
+    """Return how far a pose is off [m, m, rad]."""
+    off = np.subtract(found, true)
+    off[2] = math.remainder(off[2], 2 * math.pi)
+    return off
+
+
+def is_right(off: np.ndarray) -> bool:
+    return math.hypot(off[0], off[1]) < RIGHT[0] and abs(off[2]) < RIGHT[1]
 
 
 def table(rows: np.ndarray) -> None:
@@ -221,7 +231,7 @@ ARENA = (("standing", "static_data"), ("moving", "mocap_02171554"))
 
 def arena_of(file: str) -> tuple[np.lib.npyio.NpzFile, list[ln.LaserScan]] | None:
     """Return a recording of the arena: its archive and its scans; None where it is not there."""
-    path = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"), "truth", f"jackal_{file}.npz")
+    path = DATA / "truth" / f"jackal_{file}.npz"
     return (np.load(path), list(ln.open_log(path))) if path.exists() else None
 
 
@@ -257,8 +267,7 @@ def followed(
     rows = []
     found = follow(scans, plan, ln.Extractor(), odometry=odometry)
     for (_, where), true in zip(found, truth, strict=True):
-        off = np.subtract(where.pose, true)
-        off[2] = math.remainder(off[2], 2 * math.pi)
+        off = off_by(where.pose, true)
         spread = where.covariance + known**2 * np.diag((1, 1, 0))
         nees = off @ np.linalg.solve(spread, off) / 3
         rows.append((bool(where), math.hypot(off[0], off[1]), abs(off[2]), nees))
@@ -285,11 +294,9 @@ def built(seed: int) -> None:
                 plan = LineMap.from_lines(drawn, side=1, sigma=sigma)
                 for place in found:
                     where = locate(place.query, plan)
-                    x, y, turn = np.subtract(where.pose, place.truth)
-                    out = np.array((x, y, math.remainder(turn, 2 * math.pi)))
-                    right = math.hypot(x, y) < RIGHT[0] and abs(out[2]) < RIGHT[1]
+                    out = off_by(where.pose, place.truth)
                     nees = out @ np.linalg.solve(where.covariance, out) / 3
-                    rows.setdefault((error, sigma), []).append((bool(where), right, nees))
+                    rows.setdefault((error, sigma), []).append((bool(where), is_right(out), nees))
     print("| walls off | sigma | places | located, right | false | χ²/3, median |")
     print("|--:|--:|--:|--:|--:|--:|")
     for (error, sigma), of in rows.items():

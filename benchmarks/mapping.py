@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 import time
 import zipfile
@@ -22,6 +21,7 @@ from lineament_lab.evaluation.icp import icp
 from lineament_lab.evaluation.maps import absolute_errors, contradicted, doubled_walls
 from lineament_lab.evaluation.relations import Relations, read_relations
 from matplotlib.collections import LineCollection
+from recordings import DATA, LOGS
 
 from lineament import Extractor
 from lineament.logs import open_log
@@ -33,14 +33,11 @@ from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, Wheels, office
 from lineament.walls import moved, walls_of, wrapped
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
-LOGS = {
-    "Intel lab": ("truth/intel_graph.npz", "graph/intel-lab.relations"),
-    "fr079": ("truth/fr079_graph.npz", "../relations/fr079.relations"),
-    "ACES": ("carmen/aces-corrected.log.gz", None),
-    "CSAIL": ("carmen/csail-corrected.log.gz", None),
-    "Acapulco": ("carmen/acapulco-corrected.log.gz", None),
-    "Killian": ("graph/killian.g2o.zip", "graph/killian.g2o.zip"),
+#: What motions are compared with: verified relations, or the loops of the log itself.
+RELATIONS = {
+    "Intel lab": "graph/intel-lab.relations",
+    "fr079": "../relations/fr079.relations",
+    "Killian": LOGS["Killian"],
 }
 COLUMNS = (
     "log",
@@ -191,6 +188,11 @@ def loops_off(found, made, truth):
     return np.array(off).reshape(-1, 3)
 
 
+def wrong_loops(off):
+    """Whether each loop is off by more than 0.2 m or 1°."""
+    return (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
+
+
 def nees(made, truth, segments):
     """Squares of offset and angle of walls off the true ones (n, 2), over their variances."""
     lines, found = segments[:, 2:] - segments[:, :2], []
@@ -217,10 +219,9 @@ def against_truth(found, made, truth, segments):
 
 def print_truth(off, spans, squares):
     """Print what is known of simulated storeys alone."""
-    wrong = (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
     mean, median = squares.mean(axis=0), np.median(squares, axis=0)
     print(
-        f"<!-- {len(off)} loops, {wrong.sum()} wrong; spans over 10 m off by "
+        f"<!-- {len(off)} loops, {wrong_loops(off).sum()} wrong; spans over 10 m off by "
         f"{100 * np.std(spans):.4f} %, at most {100 * abs(spans).max():.4f} %; squares of "
         f"{len(squares)} walls over their variances: offsets {mean[0]:.2f} (median "
         f"{median[0]:.2f}), angles {mean[1]:.2f} ({median[1]:.2f}) -->",
@@ -327,10 +328,11 @@ def main() -> None:
     if chosen.storey is not None:
         storey(chosen.storey, chosen.rate, chosen.pictures)
         return
-    for name, (path, relations) in LOGS.items():
+    for name, path in LOGS.items():
         if chosen.log not in (None, name) or not (DATA / path).exists():
             continue
         scans = list(open_log(DATA / path))[chosen.first :: chosen.every]
+        relations = RELATIONS.get(name)
         if chosen.backwards:
             scans, relations = backwards(scans), None
         stamps = np.array([scan.stamp for scan in scans])

@@ -8,21 +8,19 @@ four of the logs, beside what chance finds. Printed are its constants, those of
 """
 
 import math
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from lineament_lab.evaluation.repeatability import RankedRepeats, ranked_repeats, with_edges
 from lineament_lab.reproduce.real import FURTHER_LOGS, LOGS
 from lineament_lab.reproduce.scans import scan_pairs
+from recordings import DATA
 
 from lineament import Extractor, Features
 from lineament.kernels.writing import _FALL, _PROMINENCE, _RISE, _SPREAD
 
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 PAIRS, BINS = 150, np.linspace(0.0, 1.0, 6)
 #: Of a kind, its present constants: where half are found again, and how fast that changes.
 PRESENT = {"corners": (_SPREAD, -_FALL), "edges": (_PROMINENCE, _RISE)}

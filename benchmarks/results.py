@@ -9,7 +9,6 @@ import argparse
 import ast
 import hashlib
 import math
-import os
 import re
 import statistics
 import subprocess
@@ -31,6 +30,7 @@ from lineament_lab.reproduce.contenders import KEYPOINTS
 from lineament_lab.reproduce.findings import Columns, cell_text, cells
 from lineament_lab.reproduce.machine import machine
 from lineament_lab.reproduce.real import FURTHER_LOGS
+from recordings import DATA
 
 from lineament import Extractor
 from lineament.methods import METHODS
@@ -38,7 +38,6 @@ from lineament.simulation import SENSORS
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = tuple(ROOT / name for name in ("docs/results.md", "README.md", "docs/comparison.md"))
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 SEEDS = range(5)
 #: Kernels and methods, what simulates, bounds and moves; rivals, metrics and experiments. Those of
 #: maps are measured by other benchmarks.

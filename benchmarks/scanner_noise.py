@@ -5,11 +5,11 @@ are chosen on every second log; the others show what they are worth.
 """
 
 import math
-import os
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from recordings import DATA
 
 from lineament.kernels.noise import SPREAD, TYPICAL_SIGMA
 from lineament.logs import open_log
@@ -42,8 +42,7 @@ def sigma_of(path: Path) -> float:
 
 def main() -> None:
     """Print the noise of each log, and what each half says."""
-    folder = Path(os.environ["LINEAMENT_DATA"])
-    sigmas = np.array([sigma_of(folder / name) for name in LOGS])
+    sigmas = np.array([sigma_of(DATA / name) for name in LOGS])
     print("| log | σ [mm] | chooses |\n|---|---|---|")
     for k, (name, sigma) in enumerate(zip(LOGS, sigmas, strict=True)):
         print(f"| {name} | {1000 * sigma:.2f} | {'yes' if k % 2 else ''} |")

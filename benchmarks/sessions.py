@@ -18,8 +18,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from lineament_lab.evaluation.maps import absolute_errors, alignment, doubled_walls
-from mapping import DATA, LOGS, drive, nees
+from mapping import drive, nees
 from matplotlib.collections import LineCollection
+from recordings import DATA, LOGS
 
 from lineament.errors import NothingFoundError
 from lineament.logs import open_log
@@ -233,7 +234,7 @@ def real(pictures: Path | None) -> None:
     print("\n| log | map, drive | placed, of [m] | off (RMS, most) [m] ", end="")
     print("| ATE map | drive | both [m] | doubled | walls [m] |")
     print("|---|---|--:|--:|--:|--:|--:|--:|--:|")
-    for name, (log, _) in LOGS.items():
+    for name, log in LOGS.items():
         if not (DATA / log).exists():
             continue
         scans = list(open_log(DATA / log))

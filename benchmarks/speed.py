@@ -10,19 +10,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
 import numpy as np
 from lineament_lab.reproduce.machine import machine
+from recordings import DATA
 
 import lineament as ln
 from lineament.simulation import SENSORS, building, drive
 from lineament.tasks.extract import extract_log
-
-DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 
 
 def median_seconds(call: Callable[[], object], least: float = 0.2, repetitions: int = 7) -> float:
@@ -82,30 +81,28 @@ def reference_microseconds() -> float:
 
 
 def arithmetic(n: int) -> float:
-    """Work that needs nothing but a processor: what threads can gain at all, here and now."""
+    """Work that needs nothing but a processor: what workers can gain at all, here and now."""
     total = 0.0
     for i in range(n):
         total += (i * 0.5) % 3.0
     return total
 
 
-def in_turns(
-    one: Callable[[], object], two: Callable[[], object], rounds: int
-) -> list[list[float]]:
-    """Times of two calls, one after the other: the machine's moods meet both."""
-    times: list[list[float]] = [[], []]
+def in_turns(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
+    """Times of the calls, one after the other: the machine's moods meet all."""
+    times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(rounds):
-        for call, taken in zip((one, two), times, strict=True):
+        for name, call in calls.items():
             started = time.perf_counter()
             call()
-            taken.append(time.perf_counter() - started)
+            times[name].append(time.perf_counter() - started)
     return times
 
 
 def gain_of_two(one: Callable[[], object], two: Callable[[], object]) -> float:
     """Ratio of the median times of two calls."""
-    first, second = in_turns(one, two, 15)
-    return statistics.median(first) / statistics.median(second)
+    first, second = map(statistics.median, in_turns({"one": one, "two": two}, 15).values())
+    return first / second
 
 
 def gain_of_the_machine() -> float:
@@ -142,12 +139,11 @@ def speed_of_method(method: str, sensor: str) -> tuple[int, str, str, float]:
 
     block = extractor._new_block(first, len(scans))
     block.load(ranges)
-    kernels, call = (
-        microseconds(times, len(scans))
-        for times in in_turns(
-            lambda: extractor.method.run(block), lambda: [extractor(scan) for scan in scans], 1500
-        )
-    )
+    calls = {
+        "kernels": lambda: extractor.method.run(block),
+        "call": lambda: [extractor(scan) for scan in scans],
+    }
+    kernels, call = (microseconds(of, len(scans)) for of in in_turns(calls, 1500).values())
     gain = gain_of_two(lambda: batch(1), lambda: batch(2))
     return len(first), kernels, call, gain
 

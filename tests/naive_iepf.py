@@ -20,8 +20,6 @@ def authors_iepf(points, max_vertices):
     distance to the infinite line through the ends of a part is the largest of all parts, until
     there are min(n, `max_vertices`) vertices. Of points that tie, the first is taken.
     """
-    if len(points) <= 2:
-        return points
     vertices = [0, len(points) - 1]
     splits = [_farthest(points, *vertices)]
     while len(vertices) < min(max_vertices, len(points)):
@@ -37,10 +35,6 @@ def _farthest(points, first, last):
         return -1.0, first
     chord = points[last] - points[first]
     arms = points[first + 1 : last] - points[first]
-    length = math.hypot(*chord)
-    if length > 0.0:
-        distances = np.abs(chord[0] * arms[:, 1] - chord[1] * arms[:, 0]) / length
-    else:
-        distances = np.hypot(arms[:, 0], arms[:, 1])
+    distances = np.abs(chord[0] * arms[:, 1] - chord[1] * arms[:, 0]) / math.hypot(*chord)
     largest = float(distances.max())
     return largest, first + 1 + int(np.argmax(distances >= largest - TIE))

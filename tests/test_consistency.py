@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from lineament_lab.evaluation import NormalisedErrors
-from worlds import NOISE, STEP, fan, room, scan_of, vertex, wall
+from worlds import NOISE, STEP, errors_of_lines, fan, room, scan_of, vertex, wall
 
 from lineament import Extractor
 from lineament.bounds import arc_bound, corner_bound, line_bound
@@ -50,11 +50,7 @@ def lines_of(name, case, runs, seed):
     lines = np.concatenate([f.segments for f in batch if len(f.segments) == 1])
     assert len(lines) >= (0.998 if name == "optimal" else 1) * runs
     assert name == "optimal" or (lines["n_points"] == len(angles)).all()
-    alpha = math.radians(normal)
-    # Seen from inside, beams run along the normal turned left by 90°.
-    turn = np.angle(np.exp(1j * (lines["angle"] - (alpha + math.pi / 2))))
-    left = -np.array([math.cos(alpha), math.sin(alpha)])
-    return lines, np.column_stack((lines["centroid"] @ left + distance, turn))
+    return lines, errors_of_lines(lines, distance, normal)
 
 
 def bound(case):

@@ -105,11 +105,19 @@ def test_seeds_are_merged_and_recordings_are_read_once(data):
     json.dumps(found["similarity"].to_dict(), allow_nan=False)
 
 
-@pytest.mark.parametrize("name", ["tracking", "real"])
-def test_without_recordings_nothing_is_measured(name, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        ("tracking", "The recordings are missing: nothing is measured."),
+        ("real", "The recordings are missing: nothing is measured."),
+        ("plans", "not at hand"),
+    ],
+)
+def test_without_recordings_nothing_is_measured(name, missing, tmp_path):
     for setting in (Setting(), Setting(1, 0, tmp_path)):
         findings = run_experiments([name], setting, silent)[name]
-        assert findings.text == ("The recordings are missing: nothing is measured.",)
+        assert missing in findings.text[0]
+        assert len(findings.text) == 1
         assert findings.tables == findings.figures == ()
 
 

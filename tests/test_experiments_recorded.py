@@ -183,9 +183,3 @@ class TestPlans:
             np.abs(longer * np.sin(scan.angles)).max(), rel=1e-3
         )
         assert not longer[view.surface == 1].any()
-
-    def test_without_plans_nothing_is_measured(self, tmp_path):
-        for data in (None, tmp_path):
-            found = run_experiments(["plans"], Setting(1, 0, data), silent)["plans"]
-            assert "not at hand" in found.text[0]
-            assert found.tables == ()

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from lineament_lab.evaluation import NormalisedErrors
-from worlds import fan, scan_of, wall
+from worlds import errors_of_lines, fan, scan_of, wall
 
 import lineament as ln
 from lineament import Extractor, LaserScan, RangeNoise
@@ -73,8 +73,7 @@ def test_covariance_of_a_lone_wall_is_that_of_its_errors(name, n):
     batch = Extractor(name).batch(rng.normal(far, 0.01, (400, n)), angles=angles)
     lines = np.concatenate([f.segments for f in batch if len(f.segments) == 1])
     assert len(lines) > 350
-    turn = np.angle(np.exp(1j * (lines["angle"] - math.pi / 2)))
-    errors = np.column_stack((5.0 - lines["centroid"][:, 0], turn))
+    errors = errors_of_lines(lines, 5.0, 0.0)
     assert 0.7 < NormalisedErrors.of(errors, lines["covariance"]).mean_ratio < 1.4
 
 
@@ -84,14 +83,12 @@ def test_covariance_of_a_lone_wall_is_that_of_its_errors(name, n):
 def test_covariance_of_a_wall_as_short_as_its_errors(name, n, incidence, noise):
     """Four beams at 2 m are 3.5 cm, with errors of 1 cm: not linear in these, up to 2.2 to 4.5."""
     rng, angles = np.random.default_rng((5, n)), (np.arange(n) - (n - 1) / 2) * math.radians(1 / 3)
-    far = wall(angles, 2.0 * math.cos(math.radians(incidence)), incidence)
+    distance = 2.0 * math.cos(math.radians(incidence))
+    far = wall(angles, distance, incidence)
     batch = Extractor(name, noise=noise).batch(rng.normal(far, 0.01, (1500, n)), angles=angles)
     lines = batch.segments
     assert len(lines) > 1400
-    normal = math.radians(incidence)
-    across = np.array([math.cos(normal), math.sin(normal)])
-    turn = np.angle(np.exp(1j * (lines["angle"] - normal - math.pi / 2)))
-    errors = np.column_stack((2.0 * math.cos(normal) - lines["centroid"] @ across, turn))
+    errors = errors_of_lines(lines, distance, incidence)
     assert 0.7 < NormalisedErrors.of(errors, lines["covariance"]).mean_ratio < 1.4
 
 

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from lineament_lab.methods.flirt import FLIRT, foreground
 from lineament_lab.methods.keypoints import runs_of
-from worlds import BOX, NOISE, fan, full_circle, room, scan_of, vertex
+from worlds import BOX, BOX_CORNERS, NOISE, fan, full_circle, room, scan_of, vertex
 
 from lineament import Extractor, LaserScan
 from lineament.methods import get_method
-
-BOX_CORNERS = [(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)]
 
 
 def corner_scan(opening=90, half=20, **shape):

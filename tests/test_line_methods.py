@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
+from worlds import BOX, BOX_CORNERS, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor, LaserScan
 from lineament.methods import get_method
@@ -14,7 +14,6 @@ NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_
 and_others = pytest.mark.parametrize(
     "extractor", [*NAMES, "liu", "liu:paper", "optimal"], indirect=True
 )
-BOX_CORNERS = [(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)]
 
 
 @pytest.fixture(params=NAMES, scope="module")

@@ -18,7 +18,7 @@ from lineament_lab.evaluation.ple import (
     score_map,
     sparing_map,
 )
-from naive_iepf import authors_iepf, iepf_map
+from naive_iepf import iepf_map
 
 from lineament import LaserScan
 from lineament.errors import LogError
@@ -96,26 +96,6 @@ def test_a_map_of_few_vertices_is_nearer_to_the_truth_than_the_authors_best(simu
     scans = replace(odd(simulated), max_vertices=(30,))
     area_error = run_benchmark(scans, sparing_map("optimal")).means()["area_error"]
     assert area_error[0] < 0.8 * min(scans.means()["area_error"]["ple+"])
-
-
-def test_iepf_of_hardly_any_points_and_of_one_many_times():
-    assert [len(authors_iepf(np.ones((n, 2)), 5)) for n in (0, 1, 2)] == [0, 1, 2]
-    assert authors_iepf(np.ones((6, 2)), 4).tolist() == [[1.0, 1.0]] * 4
-    points = np.array([[0, 0], [2, 0], [4, 0]], float)
-    assert authors_iepf(points, 99).tolist() == points.tolist()
-
-
-def test_iepf_adds_the_farthest_of_all_points_again_and_again():
-    points = np.random.default_rng(0).normal(size=(12, 2))
-    taken = [0, 11]
-    for budget in range(2, 13):
-        assert np.array_equal(authors_iepf(points, budget), points[sorted(taken)])
-        off = {}
-        for i in set(range(12)) - set(taken):
-            a = points[max(k for k in taken if k < i)]
-            arm, chord = points[i] - a, points[min(k for k in taken if k > i)] - a
-            off[i] = np.linalg.norm(arm - arm @ chord / (chord @ chord) * chord)
-        taken += [max(off, key=off.get)] if off else []
 
 
 def test_scores_by_hand():

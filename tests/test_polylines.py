@@ -6,7 +6,7 @@ from itertools import combinations, pairwise, product
 import numpy as np
 import pytest
 from lineament_lab.evaluation.ple import polylines_of, score_map
-from worlds import BOX, fan, full_circle, random_scan, room, scan_of, vertex
+from worlds import BOX, BOX_CORNERS, fan, full_circle, random_scan, room, scan_of, vertex
 
 import lineament as ln
 from lineament.kernels import layout as at
@@ -134,8 +134,7 @@ def test_a_room_all_around_is_one_closed_polyline(offset):
     angles = full_circle() + offset
     (polyline,) = mapped(room(angles, BOX), angles, 5)
     np.testing.assert_array_equal(polyline[0], polyline[-1])
-    corners = np.array([[2.0, 1.3], [-2.4, 1.3], [-2.4, -1.7], [2.0, -1.7]])
-    distances = np.hypot(*(polyline[:-1, None] - corners).T)
+    distances = np.hypot(*(polyline[:-1, None] - BOX_CORNERS).T)
     assert distances.min(axis=0).max() < 1e-7
     assert sorted(distances.argmin(axis=0).tolist()) == [0, 1, 2, 3]
 

@@ -1,7 +1,7 @@
 """The document of results is as new as the code that it measures."""
 
 import ast
-import importlib.util
+import importlib
 import re
 import sys
 from pathlib import Path
@@ -16,17 +16,8 @@ from lineament.simulation import SENSORS, Sensor, scene, truth
 ROOT = Path(__file__).parents[1]
 
 
-def benchmark(name):
-    """Import a script of benchmarks/, which is no package."""
-    path = ROOT / "benchmarks" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-results, aims = benchmark("results"), benchmark("aims")
+sys.path.append(str(ROOT / "benchmarks"))
+results, aims = map(importlib.import_module, ("results", "aims"))
 
 
 def test_tables_are_of_the_code_that_is_here():

@@ -18,6 +18,17 @@ from lineament.checks.scans import (  # noqa: F401  (others import them from her
 from lineament.simulation import Sensor, World
 
 NOISE = RangeNoise(sigma=0.01)
+#: Where the walls of `BOX` meet [m].
+BOX_CORNERS = [(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)]
+
+
+def errors_of_lines(lines, distance: float, normal_deg: float) -> np.ndarray:
+    """Errors of lines off a wall: the offset at the centroid to its left [m], and the angle."""
+    normal = math.radians(normal_deg)
+    off = distance - lines["centroid"] @ (math.cos(normal), math.sin(normal))
+    # Seen from inside, beams run along the normal turned left by 90°.
+    turn = np.angle(np.exp(1j * (lines["angle"] - normal - math.pi / 2)))
+    return np.column_stack((off, turn))
 
 
 def vertex(angles, distance: float, opening_deg: float, *, convex: bool) -> np.ndarray:

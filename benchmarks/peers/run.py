@@ -24,12 +24,12 @@ from lineament.simulation import SCENES, SENSORS
 #: Lines meet in a corner if both end within so much of where they do [m].
 REACH = 0.3
 COLUMNS = {
-    "corner F1": ("corner_f1_0.10", 1.0),
-    "precision": ("corner_precision_0.10", 1.0),
-    "recall": ("corner_recall_0.10", 1.0),
-    "median error [mm]": ("corner_median_error", 1e3),
-    "segment F1": ("segment_f1", 1.0),
-    "µs a scan": ("time", 1.0),
+    "corner F1": "corner_f1_0.10",
+    "precision": "corner_precision_0.10",
+    "recall": "corner_recall_0.10",
+    "median error [mm]": "corner_median_error",
+    "segment F1": "segment_f1",
+    "µs a scan": "time",
 }
 
 #: What a program wrote of one scan: segments (n, 4), corners (m, 2) [m], and its time [µs].
@@ -48,7 +48,7 @@ def write_scans(scans: Sequence[LaserScan], path: Path) -> None:
 
 def read_features(path: Path, count: int) -> list[Found]:
     """Read what a program found in so many scans; ValueError names the line that is wrong."""
-    found: list[Found] = [([], [], []) for _ in range(count)]
+    found: dict[int, Found] = {number: ([], [], []) for number in range(count)}
     kinds = {"segment": (0, 4), "corner": (1, 2), "time": (2, 1)}
     for number, row in enumerate(csv.reader(path.read_text(encoding="utf-8").splitlines()), 1):
         try:
@@ -56,36 +56,30 @@ def read_features(path: Path, count: int) -> list[Found]:
             values = [float(value) for value in row[2:]]
             if len(values) != width or not np.isfinite(values).all():
                 raise ValueError
-            of_scan = found[int(row[0])] if int(row[0]) >= 0 else None
-            if of_scan is None:
-                raise ValueError
-        except (KeyError, IndexError, ValueError):
+            of_scan = found[int(row[0])]
+        except (LookupError, ValueError):
             kind = "scan,segment,x1,y1,x2,y2, scan,corner,x,y or scan,time,microseconds"
             raise ValueError(f"{path}, line {number}: {','.join(row)!r}, expected {kind}") from None
-        if place == 2:
-            of_scan[2].append(values[0])
-        else:
-            of_scan[place].append(values)
-    return found
+        of_scan[place].append(values if width > 1 else values[0])
+    return list(found.values())
 
 
 def features_of(scan: LaserScan, found: Found) -> Features:
     """Make features of what a program found, for our metrics; without covariances."""
     ends = np.reshape(found[0], (-1, 4))
-    beams = np.rint((np.arctan2(ends[:, 1::2], ends[:, ::2]) - scan.angle_min) / _step(scan))
+    bearings = np.arctan2(ends[:, 1::2], ends[:, ::2])
+    beams = np.rint((bearings - scan.angle_min) / scan.angle_increment)
     beams = np.clip(np.sort(beams, axis=1), 0, len(scan) - 1).astype(int)
     order = np.argsort(beams[:, 0], kind="stable")
     ends, beams = ends[order], beams[order]
     tables = {name: np.zeros(0, dtype) for name, dtype in TABLES.items()}
-    tables["segments"] = np.zeros(len(ends), TABLES["segments"])
-    for row, (x1, y1, x2, y2), (first, last) in zip(tables["segments"], ends, beams, strict=True):
-        row["start"], row["end"], row["centroid"] = (
-            (x1, y1),
-            (x2, y2),
-            ((x1 + x2) / 2, (y1 + y2) / 2),
-        )
-        row["angle"], row["length"] = np.arctan2(y2 - y1, x2 - x1), np.hypot(x2 - x1, y2 - y1)
-        row["first_beam"], row["last_beam"], row["n_points"] = first, last, last - first + 1
+    tables["segments"] = segments = np.zeros(len(ends), TABLES["segments"])
+    start, end = ends[:, :2], ends[:, 2:]
+    segments["start"], segments["end"], segments["centroid"] = start, end, (start + end) / 2
+    x, y = (end - start).T
+    segments["angle"], segments["length"] = np.arctan2(y, x), np.hypot(x, y)
+    segments["first_beam"], segments["last_beam"] = beams.T
+    segments["n_points"] = beams[:, 1] - beams[:, 0] + 1
     corners = np.reshape(found[1], (-1, 2)) if found[1] else intersections(ends)
     tables["corners"] = np.zeros(len(corners), TABLES["corners"])
     tables["corners"]["position"], tables["corners"]["segments"] = corners, -1
@@ -123,10 +117,6 @@ def run(command: Sequence[str], frames: Sequence[Frame]) -> dict[str, float]:
         **Scores.total(scores).summary(),
         **({"time": float(np.median(taken))} if taken else {}),
     }
-
-
-def _step(scan: LaserScan) -> float:
-    return float(scan.angle_increment)
 
 
 def main() -> None:
