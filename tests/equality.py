@@ -10,8 +10,13 @@ import numpy as np
 from liu_2023 import bilateral_filter
 
 from lineament import Extractor
-from lineament.checks.sound import directions, first_problem, positive
+from lineament.checks.sound import first_problem
 from lineament.kernels import LARGEST
+from lineament.methods import method_names
+
+#: Keypoints have no kernels, and corners without an opening: tests/test_keypoints.py.
+KEYPOINTS = ("falko", "flirt")
+WITH_KERNELS = [name for name in method_names() if not name.startswith(KEYPOINTS)]
 
 
 def assert_same_run(scan, extractor: Extractor) -> dict:
@@ -107,21 +112,12 @@ def direction_of(line):
     return np.array([math.cos(line["angle"]), math.sin(line["angle"])])
 
 
-def assert_directed(segments):
-    """Hold that segments lead from their start to their end, as long as they say."""
-    assert next(directions(segments), "") == ""
-
-
-def assert_positive_definite(covariances):
-    assert positive(covariances).all()
-
-
 def assert_sound(features, scan, method):
     """Hold what is true of the features of any scan, by a method without edges and slits."""
     assert first_problem(features, scan) == ""
     segments, corners, n = features.segments, features.corners, len(scan)
     assert np.isfinite(corners["response"]).all()
-    if method.name in ("falko", "flirt"):  # Keypoints are of no segment.
+    if method.name in KEYPOINTS:  # They are of no segment.
         assert len(segments) == 0
         assert (corners["segments"] == -1).all()
         return

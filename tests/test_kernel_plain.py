@@ -7,22 +7,19 @@ arrays refuse both. Work is counted in lines, not by the clock.
 import importlib
 import statistics
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import fields
 from itertools import chain
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 from conftest import packages
+from equality import WITH_KERNELS
 from hostile import hard_scans
 from worlds import degenerate_scans, random_scan
 
 from lineament.features import TABLES
-from lineament.methods import method_names
 
-#: Keypoints have no kernels, and corners without an opening: tests/test_keypoints.py.
-WITH_KERNELS = [name for name in method_names() if not name.startswith(("falko", "flirt"))]
 NAMES = [*WITH_KERNELS, "maps"]
 every_name = pytest.mark.parametrize("name", NAMES)
 
@@ -56,12 +53,11 @@ SCANS += [degenerate_scans()[name] for name in ("noisy box", "grazing", "ring of
 @contextmanager
 def doubled_lengths():
     """Double each length that a kernel has, where the kernels are plain Python."""
-    with ExitStack() as stack:
+    with pytest.MonkeyPatch.context() as patch:
         for module in packages().values():
             for name, factor in {**dict.fromkeys(LENGTHS, 2.0), **SQUARES}.items():
                 if hasattr(module, name):
-                    value = getattr(module, name) * factor
-                    stack.enter_context(patch.object(module, name, value))
+                    patch.setattr(module, name, getattr(module, name) * factor)
         yield
 
 

@@ -10,6 +10,7 @@ import lineament as ln
 from lineament import Extractor
 from lineament.methods import DEFAULT_METHOD, get_method, method_names
 from lineament.methods.liu import Liu
+from lineament.methods.parameters import MOST_VERTICES
 
 NAN, INF = math.nan, math.inf
 NOT_NUMBERS = ["1", None, True, 1j, [1.0]]
@@ -141,7 +142,9 @@ def test_refusals_name_what_is_expected():
         ("liu", {"sigma_d": 0}, "sigma_d is 0, expected a number > 0"),
         ("pdbs", {"beta": 2}, r"beta is 2, expected a number > 0 and < 1\.57079632679"),
         ("iepf", {"settling": 1}, "settling is 1, expected True or False"),
-        ("ransac", {"seed": 2**31 - 1}, "seed is 2147483647, .* ≥ 1 and < 2147483647"),
+        ("ransac", {"seed": 2**31 - 1}, "seed is 2147483647, .* ≥ 1 and < 2147483647$"),
+        ("liu", {"half_width": 10**11}, "half_width is 100000000000, .* ≥ 0 and < 2147483648$"),
+        ("liu", {"max_vertices": 10**6}, f"max_vertices is 1000000, .* ≥ 0 and < {MOST_VERTICES}$"),
         (
             "iepf",
             {"proportion": 0, "noise_factor": 0},

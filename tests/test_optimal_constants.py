@@ -21,12 +21,10 @@ def replaced(name: str, value: float) -> Iterator[None]:
     """Replace a constant wherever a kernel of the method has it."""
     modules = [m for m in packages("lineament.kernels.optimal").values() if hasattr(m, name)]
     assert len(modules) > 1
-    before = getattr(modules[0], name)
-    for module in modules:
-        setattr(module, name, value)
-    yield
-    for module in modules:
-        setattr(module, name, before)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in modules:
+            patch.setattr(module, name, value)
+        yield
 
 
 def flat(half=30, step=ONE):

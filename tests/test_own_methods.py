@@ -253,17 +253,14 @@ def test_commands_take_it(mine, capsys, refused):
     assert run(["plot", "wall.npz", "-m", "my.py:find", "-o", "mine.png"]) == 0
     assert run(["methods", "my.py:Cut"]) == 0
     assert "at               60" in capsys.readouterr().out
+    words = ["compare", "wall.npz", "-m", "optimal", "-m", "my.py:Cut", "-o", "c.html", "-q"]
+    assert run(words) == 0
+    assert "my.py:Cut" in (mine / "c.html").read_text(encoding="utf-8")
     line = refused("extract wall.npz -m my.py:fails -o f.csv -q")
     assert line == "lineament: my.py:fails failed: IndexError: list index out of range (my.py:9)"
     assert refused("extract wall.npz -m my.py:empty -o f.csv -q").endswith("but 1 was given")
     assert not (mine / "f.csv").exists()
     refused("extract wall.npz -m my.py:lost -o f.csv -q", 2)
-
-
-def test_compare_takes_it(mine):
-    words = ["compare", "wall.npz", "-m", "optimal", "-m", "my.py:Cut", "-o", "c.html", "-q"]
-    assert run(words) == 0
-    assert "my.py:Cut" in (mine / "c.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("workers", [["--threads", "1"], ["--processes", "2"]])

@@ -4,22 +4,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from equality import WITH_KERNELS
 from worlds import degenerate_scans, fan, random_scan, scan_of, wall
 
 from lineament import Extractor, open_log
-from lineament.methods import get_method, method_names
+from lineament.methods import get_method
 
 pytestmark = pytest.mark.slow
 
 #: Methods and presets, with any number of vertices and with few of them; some know no vertices.
 SETTINGS = [
     (name, vertices)
-    for name in method_names()
+    for name in WITH_KERNELS
     for vertices in (0, 5, 20)
     if not vertices or hasattr(get_method(name), "max_vertices")
-    if not name.startswith(("falko", "flirt"))  # Keypoints are of no segment.
 ]
 
 
@@ -55,13 +53,6 @@ def test_recorded_scans(name, vertices, data_dir):
     log = open_log(data_dir / "carmen" / "csail-corrected.log.gz")
     for index in range(0, len(log), len(log) // 20):
         assert_in_their_clusters(log[index], extractor(name, vertices)(log[index]))
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from(SETTINGS))
-def test_any_scan(seed, chosen):
-    scan = random_scan(seed)
-    assert_in_their_clusters(scan, extractor(*chosen)(scan))
 
 
 def test_a_line_of_a_map_over_a_jump_joins_its_clusters():

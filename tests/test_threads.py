@@ -1,7 +1,6 @@
 """Threads: one object that eight of them share gives each what it would give it alone."""
 
 import signal
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from threading import Barrier
@@ -9,11 +8,12 @@ from threading import Barrier
 import numba
 import numpy as np
 import pytest
-from test_copies import BEARINGS, WALLS, scans_of, values
-from test_extractor import same
+from test_copies import BEARINGS, WALLS, scans_of
 from text_logs import flaser
 
 from lineament import Extractor, LaserScan, Tracker, open_log, progress
+from lineament.checks.claims import taking_turns, words_of
+from lineament.checks.sound import difference
 from lineament.mapping import LocalMap
 from lineament.methods import get_method
 from lineament.motion import Odometer
@@ -26,11 +26,8 @@ OTHERS = [LaserScan(x / np.cos(BEARINGS[:61]), angles=BEARINGS[:61]) for x in (2
 
 @pytest.fixture(autouse=True)
 def _switching():
-    """Let threads take turns as often as they can."""
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(1e-5)
-    yield
-    sys.setswitchinterval(before)
+    with taking_turns():
+        yield
 
 
 def in_threads(work, count=8):
@@ -55,9 +52,9 @@ def test_threads_share_an_extractor_in_batches_and_traces():
         for i in range(8):
             order = np.roll(np.arange(4), i * k)
             found = shared.batch(rows[order], **fields, workers=1 + k % 3)
-            assert all(same(a, expected[j]) for a, j in zip(found, order, strict=True))
+            assert not any(difference(a, expected[j]) for a, j in zip(found, order, strict=True))
             trace = shared.trace(WALLS[k % 4])
-            assert same(trace.features, expected[k % 4])
+            assert difference(trace.features, expected[k % 4]) == ""
             assert trace.filtered.tolist() == WALLS[k % 4].ranges.tolist()
 
     in_threads(work)
@@ -86,15 +83,15 @@ def test_a_call_within_a_call_leaves_it_alone():
     inner = []
     for _ in range(2):  # without buffers from before, and with them
         method.after = [lambda: inner.append(extractor(WALLS[1]))]
-        assert same(extractor(WALLS[0]), expected[0])
-        assert same(inner.pop(), expected[1])
+        assert difference(extractor(WALLS[0]), expected[0]) == ""
+        assert difference(inner.pop(), expected[1]) == ""
     rows = np.array([scan.ranges for scan in WALLS])
     fields = {"angles": BEARINGS, "range_max": 30.0}
     extractor.batch(rows, **fields)
     method.after = [lambda: inner.append(extractor.batch(rows[::-1], **fields))]
     found = extractor.batch(rows, **fields)
-    assert all(map(same, found, expected))
-    assert all(map(same, inner[0], expected[::-1]))
+    assert not any(map(difference, found, expected))
+    assert not any(map(difference, inner[0], expected[::-1]))
 
 
 def test_a_signal_handler_calls_the_extractor_that_it_interrupts():
@@ -106,8 +103,8 @@ def test_a_signal_handler_calls_the_extractor_that_it_interrupts():
         found = extractor(WALLS[0])
     finally:
         signal.signal(signal.SIGINT, before)
-    assert same(found, Extractor("liu")(WALLS[0]))
-    assert same(inner[0], Extractor("liu")(WALLS[1]))
+    assert difference(found, Extractor("liu")(WALLS[0])) == ""
+    assert difference(inner[0], Extractor("liu")(WALLS[1])) == ""
 
 
 def test_threads_that_compile_a_kernel_at_the_same_time():
@@ -126,7 +123,7 @@ def test_threads_that_compile_a_kernel_at_the_same_time():
     with progress.compiling_said(shown.append):
         found = in_threads(lambda k: extractor(WALLS[k % 4]))
     expected = [Extractor("liu")(scan) for scan in WALLS]
-    assert all(same(one, expected[k % 4]) for k, one in enumerate(found))
+    assert not any(difference(one, expected[k % 4]) for k, one in enumerate(found))
     assert progress.compiling_now() == ""
     assert (progress._compiler._open, progress._compiler._depth) == (0, 0)
     assert len(turned.overloads) == 1
@@ -163,7 +160,7 @@ def test_threads_share_an_odometer_and_a_local_map():
     for _ in range(400):
         alone.add(features, tracks, (0.0, 0.0, 0.0))
         once(tracks, 1.0)
-    assert values(local.query()) == values(alone.query())
+    assert words_of(local.query()) == words_of(alone.query())
     np.testing.assert_array_equal(odometer(tracks, 1.0).covariance, once(tracks, 1.0).covariance)
 
 
@@ -178,8 +175,8 @@ def test_threads_read_a_log(write):
 
 def test_threads_share_a_scan_and_a_writer(tmp_path):
     scan = LaserScan(WALLS[0].ranges, float(BEARINGS[0]), 0.02)
-    points = in_threads(lambda _: values(scan.points))
-    assert points == [values(LaserScan(scan.ranges, scan.angle_min, 0.02).points)] * 8
+    points = in_threads(lambda _: words_of(scan.points))
+    assert points == [words_of(LaserScan(scan.ranges, scan.angle_min, 0.02).points)] * 8
     features = Extractor()(scan)
     path = tmp_path / "a.jsonl"
     with open_writer(path) as writer:

@@ -89,9 +89,13 @@ def words_of(value: Any) -> object:
         arrays = map(words_of, (value.ranges, value.angles, value.intensities))
         return repr([getattr(value, name) for name in _OF_SCANS]), *arrays
     if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, value.tobytes()
+        # The bytes of records would have their padding.
+        words = repr(value.tolist()) if value.dtype.names else value.tobytes()
+        return str(value.dtype), value.shape, words
     if isinstance(value, Iterator | list | tuple):
         return tuple(map(words_of, value))
+    if isinstance(value, dict):
+        return {name: words_of(one) for name, one in value.items()}
     if is_dataclass(value):
         return tuple(words_of(getattr(value, field.name)) for field in fields(value))
     return repr(value) if isinstance(value, float) else value

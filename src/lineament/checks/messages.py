@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from random import Random
 from typing import Any
@@ -109,19 +110,19 @@ def _given(decode: Decoder, data: bytes, encoding: str) -> object:
         return None
 
 
-class _little_memory:  # noqa: N801  (as contextlib's)
+@contextmanager
+def _little_memory() -> Iterator[None]:
     """Claim that little memory is taken within, unless somebody traces it already."""
-
-    def __enter__(self) -> None:
-        self._is_mine = not tracemalloc.is_tracing()
-        if self._is_mine:
-            tracemalloc.start()
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if self._is_mine:
-            most = tracemalloc.get_traced_memory()[1]
-            tracemalloc.stop()
-            claim(kind or most < _MOST, f"a damaged message of a few bytes takes {most >> 20} MB")
+    if tracemalloc.is_tracing():
+        yield
+        return
+    tracemalloc.start()
+    try:
+        yield
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    claim(most < _MOST, f"a damaged message of a few bytes takes {most >> 20} MB")
 
 
 # Those that lineament knows
