@@ -12,6 +12,7 @@ from ..features import Features
 from ..kernels.mapping.beams import count_passes
 from ..motion.association import associate
 from ..motion.estimate import Motion
+from ..motion.odometry import covariance_grown
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from ..walls import Numbers, segments_of, wrapped
@@ -135,7 +136,7 @@ class Drive(InTurn):
                 scan, features, prior, wide, math.sqrt(spread[0, 0]) < _SOON
             )
             self._lasted += self._since(scan.stamp)
-            self._spread = self._spread + spread if by is None else _errors_of(by, *_ODOMETRY)
+            self._spread = self._spread + spread if by is None else covariance_grown(by, *_ODOMETRY)
             if is_lost:
                 motion = Motion(*prior, spread)
             elif by_beams is not None and not has_odometry:
@@ -188,9 +189,9 @@ class Drive(InTurn):
         before, duration = self._last[2], self._since(stamp)
         if odometry is not None and self._last[1] is not None:
             step = relative(self._last[1], odometry)
-            return compose(before, step), _errors_of(step, *_ODOMETRY)
+            return compose(before, step), covariance_grown(step, *_ODOMETRY)
         least = min(0.02 + 0.4 * duration, 0.3), min(0.02 + 0.8 * duration, 0.7)
-        return compose(before, self._step), _errors_of(self._step, least, _CONTINUED)
+        return compose(before, self._step), covariance_grown(self._step, least, _CONTINUED)
 
     def _key(
         self,
@@ -245,11 +246,9 @@ class Drive(InTurn):
         self._around = Around.of(features, last.scan, views)
 
 
-def _errors_of(motion: Pose, least: tuple[float, float], growth: tuple[float, float]) -> Array:
-    """Return the covariance of a motion whose deviations grow with its way and its turn."""
-    way = least[0] + growth[0] * math.hypot(motion[0], motion[1])
-    turn = least[1] + growth[1] * abs(motion[2])
-    return np.diag((way, way, turn)) ** 2
+def steps_between(poses: Array) -> Array:
+    """Way to each pose from the one before (n,) [m]."""
+    return np.asarray(np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T))
 
 
 def turned(covariance: Array, angle: float) -> Array:
