@@ -17,11 +17,11 @@ ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 NAN, INF = math.nan, math.inf
 
 
-def drawn(path: Path, draw: Callable[[Any, Any], Any], room: bool = True) -> None:
-    """Write a DXF: a room, perhaps, and what is drawn in its model space beside its blocks."""
+def drawn(path: Path, draw: Callable[[Any, Any], Any]) -> None:
+    """Write a DXF: a room, and what is drawn in its model space beside its blocks."""
     drawing = ezdxf.new("R2010", units=6)
     space = drawing.modelspace()
-    for x, y, to_x, to_y in ROOM.tolist() if room else ():
+    for x, y, to_x, to_y in ROOM.tolist():
         space.add_line((x, y), (to_x, to_y))
     draw(space, drawing.blocks)
     drawing.saveas(path)

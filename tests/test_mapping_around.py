@@ -27,8 +27,8 @@ def seen(walls, pose):
     return scan, Extractor()(scan)
 
 
-def around(walls, pose=(0.0, 0.0, 0.0)):
-    scan, features = seen(walls, pose)
+def around(walls):
+    scan, features = seen(walls, (0.0, 0.0, 0.0))
     return Around.of(features, scan, views_of(np.zeros((1, 3)), [looked(scan)]))
 
 

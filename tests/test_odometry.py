@@ -18,10 +18,10 @@ SPREAD = np.array([[4.0, 1.0, -0.5], [1.0, 2.0, 0.3], [-0.5, 0.3, 1.0]]) * 1e-4
 MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5), (3, 0.5, 1.6e-4)]
 
 
-def derivative(function, at, step=1e-6):
+def derivative(function, at):
     columns = [
-        (np.array(function(at + offset)) - function(at - offset)) / (2 * step)
-        for offset in np.eye(len(at)) * step
+        (np.array(function(at + offset)) - function(at - offset)) / 2e-6
+        for offset in np.eye(len(at)) * 1e-6
     ]
     return np.transpose(columns)
 
