@@ -17,11 +17,11 @@ ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 NAN, INF = math.nan, math.inf
 
 
-def drawn(path: Path, draw: Callable[[Any, Any], Any], room: bool = True) -> None:
-    """Write a DXF: a room, perhaps, and what is drawn in its model space beside its blocks."""
+def drawn(path: Path, draw: Callable[[Any, Any], Any]) -> None:
+    """Write a DXF: a room, and what is drawn in its model space beside its blocks."""
     drawing = ezdxf.new("R2010", units=6)
     space = drawing.modelspace()
-    for x, y, to_x, to_y in ROOM.tolist() if room else ():
+    for x, y, to_x, to_y in ROOM.tolist():
         space.add_line((x, y), (to_x, to_y))
     draw(space, drawing.blocks)
     drawing.saveas(path)
@@ -49,23 +49,20 @@ def _holds_itself(space: Any, blocks: Any) -> None:
     space.add_blockref("a", (0, 0))
 
 
-def _columns_of_arcs(space: Any, blocks: Any) -> None:
-    blocks.new("a").add_arc((0, 0), 500.0, 0, 359)
-    grid = {"row_count": 30, "column_count": 30, "row_spacing": 1, "column_spacing": 1}
-    space.add_blockref("a", (0, 0), dxfattribs=grid)
+def _grid(inside: Callable[[Any], Any], count: int, step: float = 1.0) -> Callable[[Path], None]:
+    """Write a block that stands so many times along and across."""
+
+    def draw(space: Any, blocks: Any) -> None:
+        inside(blocks.new("a"))
+        grid = {"row_count": count, "column_count": count, "row_spacing": step}
+        space.add_blockref("a", (0, 0), dxfattribs={**grid, "column_spacing": step})
+
+    return lambda path: drawn(path, draw)
 
 
-def _grid(space: Any, blocks: Any) -> None:
-    blocks.new("a").add_line((0, 0), (1, 0))
-    grid = {"row_count": 30000, "column_count": 30000, "row_spacing": 1, "column_spacing": 1}
-    space.add_blockref("a", (0, 0), dxfattribs=grid)
-
-
-def _hatch(space: Any, blocks: Any) -> None:
-    blocks.new("a").add_line((0, 0), (5, 0))
-    blocks["a"].add_line((0, 0), (0, 5))
-    grid = {"row_count": 200, "column_count": 200, "row_spacing": 0.02, "column_spacing": 0.02}
-    space.add_blockref("a", (0, 0), dxfattribs=grid)
+def _corner(block: Any) -> None:
+    block.add_line((0, 0), (5, 0))
+    block.add_line((0, 0), (0, 5))
 
 
 def sparse(path: Path) -> None:
@@ -120,7 +117,7 @@ def _spline(to: Any, weight: float, knot: float) -> None:
 #: What each is beyond (or ""), how it is written, limits, and what is said of it or of the plan.
 PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
     "laughs.dxf": ("entities", lambda path: drawn(path, _laughs), {}, ""),
-    "grid.dxf": ("entities", lambda path: drawn(path, _grid), {}, ""),
+    "grid.dxf": ("entities", _grid(lambda to: to.add_line((0, 0), (1, 0)), 30_000), {}, ""),
     "rows.parquet": ("entities", lambda path: table(path, 300_000), {}, ""),
     "deep.dxf": ("depth", lambda path: drawn(path, _deep), {}, ""),
     "bigarc.dxf": ("chords", _each(lambda to: to.add_arc((0, 0), 1e12, 0, 180)), {}, ""),
@@ -135,7 +132,7 @@ PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
     "ellipse.dxf": ("chords", _each(lambda to: to.add_ellipse((0, 0), (1e9, 0), 0.5)), {}, ""),
     "huge.yaml": ("cells", _gridded(10_000, b"\0"), {}, ""),
     "stripes.yaml": ("entities", _gridded(502, b"\0\376"), {}, ""),
-    "arcs.dxf": ("walls", lambda path: drawn(path, _columns_of_arcs), {}, ""),
+    "arcs.dxf": ("walls", _grid(lambda to: to.add_arc((0, 0), 500.0, 0, 359), 30), {}, ""),
     "sparse.dxf": ("drawing", sparse, {}, ""),
     "sparse.parquet": ("drawing", sparse, {}, ""),
     "packed.parquet": (
@@ -144,7 +141,7 @@ PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
         {},
         "",
     ),
-    "hatch.dxf": ("", lambda path: drawn(path, _hatch), {}, "pairs of .* walls lie beside each"),
+    "hatch.dxf": ("", _grid(_corner, 200, 0.02), {}, "pairs of .* walls lie beside each"),
     "holds.dxf": ("", lambda path: drawn(path, _holds_itself), {}, "block 'a' holds itself"),
     "fifo.dxf": ("", os.mkfifo, {}, "is no regular file, expected a plan"),
     "fifo.parquet": ("", os.mkfifo, {}, "is no regular file, expected a plan"),

@@ -1,11 +1,17 @@
 """A room without symmetry, its plan, and what is seen of it."""
 
 import math
+from itertools import repeat
 
 import numpy as np
 
+from lineament import Extractor
 from lineament.mapping import LineMap, Query
+from lineament.mapping.drive_map import Drive
+from lineament.mapping.loops import Survey
 from lineament.simulation import SENSORS, World
+from lineament.walls import segments_of
+from lineament.walls.sights import count_of, lines_of, sights_of
 
 #: A room without symmetry, its walls seen from inside.
 RING = np.array([(-3, -2), (4, -2), (4, 1), (2, 1), (2, 3), (-1, 3), (-1, 2.4), (-3, 2.4)], float)
@@ -43,3 +49,23 @@ def scans_on(way, world=None, turn=0.0):
     world = World(np.hstack((RING, np.roll(RING, -1, axis=0))), []) if world is None else world
     for k, x in enumerate(way):
         yield SENSORS["lms361"].scan(world, (x, 0.0, turn * k), np.random.default_rng(k), 0.1 * k)
+
+
+def placed(scans, odometry=None):
+    """The drive that these scans are of, with the odometry of each, if there is any."""
+    drive, extract = Drive(), Extractor()
+    for scan, pose in zip(scans, repeat(None) if odometry is None else odometry, strict=False):
+        drive.add(scan, extract(scan), pose)
+    return drive
+
+
+def survey_of(frames, poses, again):
+    """What key frames see of all walls of the room, from `again` on under other numbers.
+
+    Their walls are where they are from `poses`, and known to a millimetre and 1 mrad.
+    """
+    plan, every = plan_of(RING), np.arange(len(RING))
+    seen = [segments_of(query_at(frame.scan.pose, plan).walls) for frame in frames]
+    sights = sights_of([(of, every + len(RING) * (k >= again)) for k, of in enumerate(seen)])
+    sights["covariance"] = np.eye(2) * 1e-6
+    return Survey(frames, poses, sights, lines_of(sights, poses, count_of(sights)))

@@ -30,14 +30,14 @@ def seen(step, mounting=MOUNTING):
     return compose(inverse(mounting), compose(tuple(step), mounting))
 
 
-def drive_of(shapes, counts=(1.0, 1.0), track=0.4, believed=0.4, noise=(0, 0, 0), seed=0):
-    """Odometry and motions of steps, by wheels that count so many times their way."""
+def drive_of(shapes, counts=(1.0, 1.0), track=0.4, noise=(0, 0, 0), seed=0):
+    """Odometry, of a track of 0.4 m, and motions of steps, by wheels that count so much."""
     rng, odometry, motions = np.random.default_rng(seed), [], []
     for way, turn in shapes:
         left = (way - track / 2 * turn) * counts[0]
         right = (way + track / 2 * turn) * counts[1]
         size = max(abs(way), track / 2 * abs(turn))
-        twist = np.array([(left + right) / 2, 0.0, (right - left) / believed])
+        twist = np.array([(left + right) / 2, 0.0, (right - left) / 0.4])
         twist += rng.standard_normal(3) * np.sqrt(size) * noise
         odometry.append(poses_along(tuple(twist.tolist()), [0.0, 1.0]))
         step = seen(poses_along((way, 0.0, turn), [1.0])[0].tolist())

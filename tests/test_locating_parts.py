@@ -13,7 +13,7 @@ from lineament import Extractor, LaserScan, RangeNoise, Tracker
 from lineament.mapping import LineMap, LocalMap, Query, locate
 from lineament.mapping.evidence import ON_DRAWING, Evidence, evidence_of
 from lineament.mapping.following import Follower
-from lineament.mapping.hypotheses import anchors, directions, hypotheses
+from lineament.mapping.hypotheses import agreement, anchors, hypotheses, spectrum
 from lineament.mapping.local_map import beams_of, moved_beams, query_of_scan, thinned
 from lineament.mapping.locate import Location, _searched
 from lineament.mapping.refine import adjusted, refined
@@ -141,6 +141,10 @@ def test_errors_of_a_wall_of_the_plan_are_those_of_all_that_is_seen_of_it(at, fl
     np.testing.assert_allclose(pose, 0.0, atol=1e-4)
     spread = np.linalg.inv(information)
     np.testing.assert_allclose(np.diag(spread), (1e-6, 1e-6, 1e-4), rtol=0.05)
+
+
+def directions(local, walls):
+    return agreement(spectrum(local), spectrum(walls))
 
 
 def test_walls_of_a_turned_room_agree_with_its_turn():

@@ -4,41 +4,32 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_room import RING, plan_of, query_at, scans_on
+from small_room import RING, scans_on, survey_of
 
 from lineament.mapping import again
 from lineament.mapping.adjust import edges_of
 from lineament.mapping.again import tied
-from lineament.mapping.loops import Survey
 from lineament.scan.poses import relative
 from lineament.simulation import World
-from lineament.walls import segments_of
-from lineament.walls.sights import count_of, lines_of, sights_of
+from lineament.walls.sights import count_of, lines_of
 
-PLAN, N = plan_of(RING), len(RING)
+N = len(RING)
 #: Two passes of three key frames; the second is 0.1 m beside the first, or 1.5 m.
 NEAR, FAR = (-2.0, -1.5, -1.0, -1.9, -1.4, -0.9), (-2.0, -1.5, -1.0, 0.5, 1.0, 1.5)
 #: Between the passes the way is known to 5 cm, or to 1 m.
 KNOWN, UNKNOWN = 0.05, 1.0
 
 
-def two_passes(way, spread, seen_again=range(N), world=None):
+def two_passes(way, spread, world=None):
     """Key frames of two passes, each with its own numbers of the walls, and their motions."""
     scans = [*scans_on(way[:3]), *scans_on(way[3:], world)]
     frames = [SimpleNamespace(scan=scan, is_torn=False) for scan in scans]
-    seen = []
-    for k, scan in enumerate(scans):
-        walls, numbers = segments_of(query_at(scan.pose, PLAN).walls), np.arange(N)
-        few = np.arange(N) if k < 3 else np.array(seen_again)
-        seen.append((walls[few], numbers[few] if k < 3 else N + np.arange(len(few))))
     poses = np.array([scan.pose for scan in scans])
-    sights = sights_of(seen)
-    sights["covariance"] = np.eye(2) * 1e-6
     spreads = np.tile(np.eye(3) * 1e-4, (5, 1, 1))
     spreads[2] = np.diag((spread, spread, 0.02)) ** 2
     motions = [relative(*map(tuple, poses[k : k + 2].tolist())) for k in range(5)]
     chain = edges_of([(k, k + 1) for k in range(5)], motions, spreads)
-    return Survey(frames, poses, sights, lines_of(sights, poses, count_of(sights))), chain
+    return survey_of(frames, poses, again=3), chain
 
 
 def walls_in(survey, chain):

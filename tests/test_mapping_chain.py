@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_room import placed
 
-from lineament import Extractor
 from lineament.mapping import chain
 from lineament.mapping.chain import _turned_round, found_back
-from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map
 from lineament.motion.estimate import Motion
 from lineament.scan.poses import compose, inverse, relative
@@ -30,12 +29,10 @@ ELSEWHERE = [
 
 def frames_on(walls, way):
     """Return the key frames of a drive, and where they were taken."""
-    extract, found, truth = Extractor(), Drive(), []
-    for scan in drive(World(walls), way, SENSORS["utm30lx"], speed=1.0, rate=4.0, seed=2):
-        found.add(scan, extract(scan))
-        truth.append(scan.pose)
-    assert not any(frame.is_lost for frame in found.frames)
-    return found.frames, [truth[frame.index] for frame in found.frames]
+    scans = [*drive(World(walls), way, SENSORS["utm30lx"], speed=1.0, rate=4.0, seed=2)]
+    frames = placed(scans).frames
+    assert not any(frame.is_lost for frame in frames)
+    return frames, [scans[frame.index].pose for frame in frames]
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from lineament_lab.evaluation.maps import absolute_errors
 from robot_driving import storey_driven
+from small_room import placed
 
 from lineament import Extractor, LaserScan
 from lineament.cli import cli
@@ -23,7 +24,7 @@ from lineament.mapping.sessions import onto_plan, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, World, drive, room
 from lineament.walls import walls_of, wrapped
-from lineament.walls.sights import SIGHT, merged, misfits
+from lineament.walls.sights import SIGHT, misfits, renumbered, same
 
 
 def edges(poses, pairs, sigma=0.05, loop=False):
@@ -187,14 +188,18 @@ def test_a_way_is_found_whatever_the_stamps_are(stamps):
     poses = [(-3.0 + 0.5 * k, 0.2, 0.05 * k) for k in range(12)]
     ring = np.array([(-4, -2), (4, -2), (4, 1), (3, 1), (3, 2), (-1, 2), (-1, 3), (-4, 3)])
     world = World(np.column_stack((ring, np.roll(ring, -1, axis=0))), [])
-    found, extract = Drive(), Extractor()
-    for k, pose in enumerate(poses):
-        stamp = 0.0 if stamps == "same" else 1.0 * (k // 2 * 2)
-        scan = SENSORS["utm30lx"].scan(world, pose, np.random.default_rng(k), stamp)
-        found.add(scan, extract(scan))
+    times = [0.0 if stamps == "same" else 1.0 * (k // 2 * 2) for k in range(12)]
+    found = placed(
+        SENSORS["utm30lx"].scan(world, pose, np.random.default_rng(k), times[k])
+        for k, pose in enumerate(poses)
+    )
     at = [compose(found.frames[k].pose, pose) for k, pose in found.scans]
     assert not any(frame.is_lost for frame in found.frames)
     assert absolute_errors(at, poses).summary()["way_rmse"] < 0.02
+
+
+def walls_of_parts(sights, found):
+    return renumbered(sights, same(sights, found.poses, found.lines, 0.03))["wall"]
 
 
 def test_roughness_is_found_and_parts_of_one_wall_are_merged():
@@ -207,10 +212,10 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
             found.append(roughness(sights, result.poses, 0.01))
         assert 0.75 * rough <= np.mean(found) <= 1.1 * rough + 1e-3
         # Parts that are apart are two walls: nobody has seen what is between them.
-        labels = merged(sights, result.poses, result.lines, 0.03)["wall"]
+        labels = walls_of_parts(sights, result)
         assert labels.tolist() == 12 * [*range(8)]
         sights["ends"] = -2.5, 2.5
-        labels = merged(sights, result.poses, result.lines, 0.03)["wall"]
+        labels = walls_of_parts(sights, result)
         assert labels.tolist() == 12 * [0, 0, 1, 1, 2, 2, 3, 3]
 
 
@@ -218,18 +223,15 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
 def driven():
     """A storey, a drive through it, and its map to be: without odometry, each scan once."""
     storey, scans, truth = storey_driven()
-    extract, placed = Extractor(), Drive()
-    for scan in scans:
-        placed.add(scan, extract(scan), scan.pose)
-    return storey, scans, truth, placed
+    return storey, scans, truth, placed(scans, [scan.pose for scan in scans])
 
 
 @pytest.mark.slow
 def test_a_drive_becomes_a_map(driven):
-    storey, scans, truth, placed = driven
-    assert not any(frame.is_lost for frame in placed.frames)
-    assert len(placed.scans) == len(scans)
-    made = make_map(placed.frames, placed.scans)
+    storey, scans, truth, way = driven
+    assert not any(frame.is_lost for frame in way.frames)
+    assert len(way.scans) == len(scans)
+    made = make_map(way.frames, way.scans)
     assert absolute_errors(made.poses, truth).summary()["way_rmse"] < 0.03
     plan = LineMap.from_lines(storey.plan.segments, side=1)
     moved = onto_plan(made, plan, placements(made, plan))
@@ -243,11 +245,10 @@ def test_a_drive_becomes_a_map(driven):
 @pytest.mark.parametrize(("carried", "first"), [(100, 20), (150, 40)])
 def test_a_robot_that_is_carried_is_found_where_it_was_before(driven, carried, first):
     _, scans, truth, _ = driven
-    order, extract, placed = [*range(carried), *range(first, first + 40)], Extractor(), Drive()
-    for k in order:
-        placed.add(scans[k], extract(scans[k]))
-    assert [frame.index for frame in placed.frames if frame.is_lost] == [carried]
-    made = make_map(placed.frames, placed.scans)
+    order = [*range(carried), *range(first, first + 40)]
+    way = placed(scans[k] for k in order)
+    assert [frame.index for frame in way.frames if frame.is_lost] == [carried]
+    made = make_map(way.frames, way.scans)
     off = [
         relative(truth[k], compose(truth[0], pose))
         for k, pose in zip(order, made.poses, strict=True)
@@ -346,18 +347,17 @@ def test_jambs_of_doors_show_how_far(rate):
         walls.append([x + 0.9, 1.15, x + 0.9, 1])
         begin = x + 0.9
     world, rng = World([*walls, [begin, 1, 60, 1]]), np.random.default_rng(0)
-    extract, way = Extractor(), Drive()
-    for k in range(8 * rate):
-        scan = SENSORS["utm30lx"].scan(world, (0.9 * k / rate - 6.0, 0.0, 0.0), rng)
-        at = way.add(scan.stamped(0, k * (10**9 // rate)), extract(scan)).pose
+    n, sensor = 8 * rate, SENSORS["utm30lx"]
+    scans = (sensor.scan(world, (0.9 * k / rate - 6.0, 0.0, 0.0), rng) for k in range(n))
+    way = placed(scan.stamped(0, k * (10**9 // rate)) for k, scan in enumerate(scans))
     assert not any(frame.is_lost for frame in way.frames)
-    assert at[0] == pytest.approx(0.9 * k / rate, abs=0.05)
+    last, at = way.scans[-1]
+    assert compose(way.frames[last].pose, at)[0] == pytest.approx(0.9 * (n - 1) / rate, abs=0.05)
 
 
 def test_one_scan_is_a_map():
     scan = next(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms361"]))
-    placed = Drive()
-    placed.add(scan, Extractor()(scan))
-    made = make_map(placed.frames, placed.scans)
+    way = placed([scan])
+    made = make_map(way.frames, way.scans)
     np.testing.assert_allclose(made.poses, [(0, 0, 0)], atol=1e-12)
     assert len(made.map.walls) >= 4

@@ -36,9 +36,9 @@ def storey_plan():
     return plan_of(storey().plan)
 
 
-def local_map(world, way, seed=0, odometry=None, step=0.2):
+def local_map(world, way, seed=0, odometry=None):
     """Drive along a way; returns the local map and the last pose."""
-    stamps, poses = drive_poses(way, speed=1.0, rate=1 / step)
+    stamps, poses = drive_poses(way, speed=1.0, rate=5.0)
     tracker, local, extract = ln.Tracker(roughness=0.0), LocalMap(roughness=0.0), ln.Extractor()
     for k, (stamp, pose) in enumerate(zip(stamps, poses, strict=True)):
         scan = SENSOR.scan(world, tuple(pose), np.random.default_rng([seed, k]), stamp)

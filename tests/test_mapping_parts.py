@@ -6,18 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from handmade import features, segment
-from small_room import scans_on
+from small_room import placed, scans_on
 
 from lineament import Extractor, Tracker
 from lineament.mapping import LocalMap, placing
-from lineament.mapping.drive_map import Drive
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import single
 from lineament.mapping.placing import is_enough, placed_on, surely_on
 from lineament.scan.poses import compose
 from lineament.simulation import World
 from lineament.walls import walls_of
-from lineament.walls.sights import SIGHT, lines_of, merged, sights_of, walls_along
+from lineament.walls.sights import SIGHT, lines_of, renumbered, same, sights_of, walls_along
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
@@ -38,7 +37,7 @@ def merged_walls(*rows, **fields):
         segments[name] = values
     sights = sights_of([(segments, np.arange(len(rows)))])
     lines = lines_of(sights, np.zeros((1, 3)), len(rows))
-    return merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"].tolist()
+    return renumbered(sights, same(sights, np.zeros((1, 3)), lines, 0.0))["wall"].tolist()
 
 
 @pytest.mark.parametrize(("turn", "walls"), [(0.1, 1), (0.14, 2)])
@@ -52,10 +51,15 @@ def test_a_short_part_of_a_bowed_wall_may_be_askew(turn, walls):
     assert len({*found}) == walls
 
 
+def survey_at(places, lost=()):
+    """Key frames at places, of which some are lost."""
+    frames = [SimpleNamespace(is_torn=k in lost) for k in range(len(places))]
+    return Survey(frames, np.column_stack((places, np.zeros(len(places)))), None, None)
+
+
 def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
     """Of five places two are wrong alike in direction, but not in where they are."""
-    poses = np.column_stack((3.0 * np.arange(6), np.zeros((6, 2))))
-    survey = Survey([None] * 6, poses, None, None)
+    survey = survey_at(np.column_stack((3.0 * np.arange(6), np.zeros(6))))
     seen = [(9.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.1, 2.0, 0.0), (-7.0, 4.0, 0.0), (1.0, 2.1, 1.0)]
     queries = [(k, compose(move, survey.pose(k))) for k, move in enumerate(seen)]
     monkeypatch.setattr(Survey, "queries", lambda *of: [q for q in queries if q[0] in of[2]])
@@ -74,7 +78,7 @@ def test_a_drive_that_looks_through_walls_at_most_places_is_elsewhere(monkeypatc
     The rest are off the plan and say nothing.
     """
     every = np.arange(30)
-    survey = Survey([None] * 30, np.column_stack((3.0 * every, np.zeros((30, 2)))), None, None)
+    survey = survey_at(np.column_stack((3.0 * every, np.zeros(30))))
     queries = [(k, compose((1.0, 2.0, 0.5), survey.pose(k))) for k in every.tolist()]
 
     class Where(SimpleNamespace):
@@ -129,34 +133,27 @@ def test_a_wall_along_another_is_hidden_by_it_up_to_10_degrees():
         assert len(single(walls)) == left
 
 
-def begun():
-    """A drive of one scan, and what was found in it."""
-    (scan,), placed = scans_on([0.0]), Drive()
-    placed.add(scan, found := Extractor()(scan))
-    return placed, found
-
-
 def going(steps, pace, count=60):
     """A drive whose scans come at a pace, which went on by the same step from each to the next."""
-    placed, _ = begun()
+    drive = placed(scans_on([0.0]))
     for k in range(1, count + 1):
         x, y, theta = np.multiply(steps, k)
-        placed._go_on(pace * k, (x, y, theta), np.eye(3), None)
-        placed._last = pace * k, None, (x, y, theta)
-    return placed
+        drive._go_on(pace * k, (x, y, theta), np.eye(3), None)
+        drive._last = pace * k, None, (x, y, theta)
+    return drive
 
 
 def test_without_odometry_a_drive_goes_on_as_it_did():
     """By the last step, and by 30 % of it beside what it may do in 0.1 s at 0.4 m/s, 0.8 rad/s."""
-    placed = going((0.05, 0.01, 0.0), 0.1)
-    pose, spread = placed._expected(6.1, None)
+    drive = going((0.05, 0.01, 0.0), 0.1)
+    pose, spread = drive._expected(6.1, None)
     np.testing.assert_allclose(pose, (61 * 0.05, 61 * 0.01, 0.0))
     way, turn = 0.02 + 0.4 * 0.1 + 0.3 * math.hypot(0.05, 0.01), 0.02 + 0.8 * 0.1
     np.testing.assert_allclose(np.sqrt(np.diag(spread)), (way, way, turn), rtol=0.02)
     # After a second it may be anywhere near; the same stamp again is one step.
-    wide = np.sqrt(np.diag(placed._expected(7.0, None)[1]))
+    wide = np.sqrt(np.diag(drive._expected(7.0, None)[1]))
     np.testing.assert_allclose(wide, (0.3 + 0.0153, 0.3 + 0.0153, 0.7), rtol=0.02)
-    np.testing.assert_allclose(placed._expected(6.0, None)[1], spread, rtol=0.05)
+    np.testing.assert_allclose(drive._expected(6.0, None)[1], spread, rtol=0.05)
 
 
 @pytest.mark.parametrize(("pace", "share"), [(0.1, 0.2), (1.0, 1.0), (2.0, 1.0)])
@@ -165,11 +162,11 @@ def test_a_step_is_believed_by_as_much_as_it_is_known_better_than_what_is_usual(
 
     What goes on is the step of the last half second.
     """
-    placed = going((0.05, 0.01, 0.0), pace)
+    drive = going((0.05, 0.01, 0.0), pace)
     usual, now = np.diag((0.1, 0.1, 0.2)) ** 2, 61 * pace
-    placed._go_on(now, (61 * 0.05 + 0.02, 61 * 0.01, 0.04), 4.0 * usual, usual)
+    drive._go_on(now, (61 * 0.05 + 0.02, 61 * 0.01, 0.04), 4.0 * usual, usual)
     believed = 0.05 + share * 0.01, 0.01, share * 0.02
-    np.testing.assert_allclose(placed._step, believed, atol=3e-4)
+    np.testing.assert_allclose(drive._step, believed, atol=3e-4)
 
 
 def test_a_robot_is_not_thought_to_go_on_faster_than_1_2_metres_a_second():
@@ -183,14 +180,14 @@ def test_a_robot_is_not_thought_to_go_on_faster_than_1_2_metres_a_second():
 
 def test_odometry_says_how_a_drive_goes_on():
     """30 mm and 20 mrad, and a tenth of the motion, beside it."""
-    placed = going((0.0, 0.0, 0.0), 0.1, 1)
-    placed._last = 0.1, (5.0, 1.0, math.pi / 2), (0.2, 0.1, 0.0)
-    pose, spread = placed._expected(0.2, (5.0, 1.3, math.pi / 2 - 0.2))
+    drive = going((0.0, 0.0, 0.0), 0.1, 1)
+    drive._last = 0.1, (5.0, 1.0, math.pi / 2), (0.2, 0.1, 0.0)
+    pose, spread = drive._expected(0.2, (5.0, 1.3, math.pi / 2 - 0.2))
     np.testing.assert_allclose(pose, (0.5, 0.1, -0.2))
     np.testing.assert_allclose(spread, np.diag((0.06, 0.06, 0.04)) ** 2)
     # Odometry that begins with this scan says nothing of the motion from the last one.
-    placed._last = 0.1, None, (0.2, 0.1, 0.0)
-    begun, without = (placed._expected(0.2, given) for given in ((5.0, 1.3, 0.0), None))
+    drive._last = 0.1, None, (0.2, 0.1, 0.0)
+    begun, without = (drive._expected(0.2, given) for given in ((5.0, 1.3, 0.0), None))
     for one, other in zip(begun, without, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -228,20 +225,12 @@ def test_parts_of_a_wall_are_known_where_they_are():
     assert walls["views"].tolist() == [1, 1, 1]
 
 
-class Frame:
-    """As much of a key frame as its place needs."""
-
-    def __init__(self, is_torn=False):
-        self.is_torn = is_torn
-
-
 def test_where_a_way_was_passed_before():
     """Around a square of 10 m, twice, by 0.5 m: 80 key frames a round, 40 m of way."""
     leg = np.linspace(0, 10, 20, endpoint=False)
     x = np.concatenate((leg, 0 * leg + 10, 10 - leg, 0 * leg))
     ring = np.column_stack((x, np.roll(x, 20)))
-    poses = np.column_stack((np.tile(ring, (2, 1)), np.zeros(160)))
-    survey = Survey([Frame() for _ in poses], poses, None, None)
+    survey = survey_at(np.tile(ring, (2, 1)))
     np.testing.assert_allclose(survey.way, 0.5 * np.arange(160))
     # In the second round, the same place in the first; then the nearest at least 5 m of way from
     # those before. Nothing of the last 12 m was seen before.
@@ -250,38 +239,32 @@ def test_where_a_way_was_passed_before():
     assert survey._passed(24) == []
     assert survey._passed(25) == [0]
     # The three nearest of four stretches that pass.
-    across = np.column_stack((np.arange(-10, 10, 0.5), np.full(40, 5.0), np.zeros(40)))
-    poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
-    survey = Survey([Frame() for _ in poses], poses, None, None)
-    assert survey._passed(160) == [60, 100, 20]
+    across = np.column_stack((np.arange(-10, 10, 0.5), np.full(40, 5.0)))
+    places = np.concatenate([np.add(across, (0, k)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
+    assert survey_at(places)._passed(160) == [60, 100, 20]
     # What comes back after 4.9 m is one stretch with what it left; after 5.1 m two. What is 25 m
     # away was not passed.
     for out, stretches in ((2.5, [0]), (2.6, [0, 2])):
         places = [(0.0, 0.0), (out, 0.0), (0.1, 0.0), (500.0, 0.0), (0.0, 25.0), (0.0, 0.0)]
-        poses = np.column_stack((places, np.zeros(6)))
-        survey = Survey([Frame() for _ in poses], poses, None, None)
-        assert survey._passed(5) == stretches
+        assert survey_at(places)._passed(5) == stretches
     # Where it was lost, what was seen before is far.
-    frames = [Frame(k == 10) for k in range(20)]
-    survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)
+    survey = survey_at(np.column_stack((np.arange(20) * 0.5, np.zeros(20))), lost=[10])
     np.testing.assert_allclose(np.diff(survey.way), [*[0.5] * 9, 12, *[0.5] * 9])
 
 
 @pytest.mark.parametrize(("step", "turn"), [(0.11, 0.0), (0.0, 0.1)])
 def test_a_key_frame_is_taken_for_each_0_3_m_or_15_degrees(step, turn):
-    placed, extract = Drive(), Extractor()
-    poses = []
-    for scan in scans_on(step * np.arange(10), turn=turn):
-        placed.add(scan, extract(scan), scan.pose)
-        poses.append(scan.pose)
-    assert [frame.index for frame in placed.frames] == [0, 3, 6, 9]
-    assert [k for k, _ in placed.scans] == [0, 0, 0, 1, 1, 1, 2, 2, 2, 3]
-    found = [compose(placed.frames[k].pose, pose) for k, pose in placed.scans]
+    scans = [*scans_on(step * np.arange(10), turn=turn)]
+    poses = [scan.pose for scan in scans]
+    drive = placed(scans, poses)
+    assert [frame.index for frame in drive.frames] == [0, 3, 6, 9]
+    assert [k for k, _ in drive.scans] == [0, 0, 0, 1, 1, 1, 2, 2, 2, 3]
+    found = [compose(drive.frames[k].pose, pose) for k, pose in drive.scans]
     off = np.subtract(found, poses)
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
     assert np.abs(off).max() < 0.02
     # Walls keep their numbers while they are seen.
-    first, last = placed.frames[0].walls, placed.frames[-1].walls
+    first, last = drive.frames[0].walls, drive.frames[-1].walls
     assert len({*first} & {*last}) >= 5
     assert len({*first}) == len(first)
 
@@ -318,6 +301,4 @@ def test_each_stretch_of_the_way_that_passed_near_is_looked_at():
     away = np.column_stack((np.full(24, 50.0), np.arange(24)))
     second = np.column_stack((np.zeros(10), 0.5 + 0.3 * np.arange(10)))
     places = np.concatenate((first, away, second, away, [(0.0, 0.0)]))
-    poses = np.column_stack((places, np.zeros(len(places))))
-    survey = Survey([Frame() for _ in poses], poses, None, None)
-    assert survey._passed(len(poses) - 1) == [40, 8]
+    assert survey_at(places)._passed(len(places) - 1) == [40, 8]

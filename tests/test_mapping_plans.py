@@ -172,7 +172,6 @@ def test_dxf_layers_are_chosen_by_name(tmp_path):
         ("a.dxf", lambda _: None, r"a\.dxf: No such file"),
         ("a.dxf", lambda p: draw(p, only=["TEXT"]), r"a\.dxf: has no walls: 0 entities"),
         ("a.parquet", lambda p: p.write_text("no"), r"a\.parquet: is no table of features"),
-        ("a.png", lambda _: None, r"a\.png: is an image, expected the \.yaml of"),
     ],
 )
 def test_what_is_no_plan_is_one_clear_line(tmp_path, name, make, line):

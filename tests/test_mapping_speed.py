@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_room import placed
 
 from lineament import Extractor, LaserScan
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.chain import loosened, slid, unseen
-from lineament.mapping.drive_map import Drive, KeyFrame
+from lineament.mapping.drive_map import KeyFrame
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import between
 from lineament.mapping.sessions import merge_onto, placements
@@ -165,14 +166,13 @@ def test_a_bare_way_is_known_as_well_as_speeds_last(bare):
 
 def driven(speeds, walls):
     """Return the drive along a corridor of a scanner of 12 m, 10 scans a second, and its poses."""
-    sensor, extract, found, truth = SENSORS["ld19"], Extractor(), Drive(), []
     ways = -5 + np.cumsum(np.concatenate(([0.0], speeds))) / 10
-    for k, x in enumerate(ways.tolist()):
-        truth.append((x, 0.0, 0.05 * math.sin(k / 9)))
-        rng = np.random.default_rng((1, k))
-        scan = sensor.scan(World(walls), truth[-1], rng, 0.1 * k)
-        found.add(scan, extract(scan))
-    return found, truth
+    truth = [(x, 0.0, 0.05 * math.sin(k / 9)) for k, x in enumerate(ways.tolist())]
+    scans = (
+        SENSORS["ld19"].scan(World(walls), pose, np.random.default_rng((1, k)), 0.1 * k)
+        for k, pose in enumerate(truth)
+    )
+    return placed(scans), truth
 
 
 def test_a_robot_that_stops_in_a_bare_corridor_does_not_know_how_long_that_is():

@@ -5,12 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_room import RING, plan_of, query_at, scans_on
+from small_room import RING, plan_of, query_at, scans_on, survey_of
 
 from lineament import Extractor
 from lineament.mapping.loops import Survey
-from lineament.walls import segments_of
-from lineament.walls.sights import lines_of, sights_of
 
 PLAN = plan_of(RING)
 
@@ -19,14 +17,10 @@ PLAN = plan_of(RING)
 def survey():
     """To and fro along 4 m in steps of 0.5 m, for 12 m; all walls are seen from everywhere."""
     extract, x = Extractor(), np.abs(np.remainder(0.5 * np.arange(25) + 4, 8) - 4) - 2
-    frames, seen = [], []
-    for scan in scans_on(x):
-        frames.append(SimpleNamespace(scan=scan, features=extract(scan), is_torn=False))
-        seen.append((segments_of(query_at(scan.pose, PLAN).walls), np.arange(len(RING))))
-    poses = np.array([frame.scan.pose for frame in frames])
-    sights = sights_of(seen)
-    sights["covariance"] = np.eye(2) * 1e-6
-    return Survey(frames, poses, sights, lines_of(sights, poses, len(RING)))
+    frames = [
+        SimpleNamespace(scan=scan, features=extract(scan), is_torn=False) for scan in scans_on(x)
+    ]
+    return survey_of(frames, np.array([frame.scan.pose for frame in frames]), again=25)
 
 
 @pytest.mark.parametrize(("q", "first"), [(4, 0), (10, 0), (11, 1), (24, 14)])
@@ -66,14 +60,10 @@ def twice(survey, drift=0.0):
 
     From key frame 28 on poses are off by the drift [m], and so are the walls that are seen.
     """
-    longer, every = np.concatenate([np.arange(25), np.arange(23, -1, -1)]), np.arange(len(RING))
-    frames = [survey.frames[k] for k in longer]
-    walls = [segments_of(query_at(frame.scan.pose, PLAN).walls) for frame in frames]
-    sights = sights_of([(of, every + len(RING) * (k >= 28)) for k, of in enumerate(walls)])
-    sights["covariance"] = np.eye(2) * 1e-6
+    longer = np.concatenate([np.arange(25), np.arange(23, -1, -1)])
     poses = survey.poses[longer]
     poses[28:, 1] += drift
-    return Survey(frames, poses, sights, lines_of(sights, poses, 2 * len(RING)))
+    return survey_of([survey.frames[k] for k in longer], poses, again=28)
 
 
 def test_loops_are_closed_where_the_way_was_passed(survey):

@@ -7,14 +7,14 @@ import pytest
 from click.testing import CliRunner
 from lineament_lab.evaluation.maps import absolute_errors
 from robot_driving import storey_driven
+from small_room import placed
 
-from lineament import Extractor, open_log
+from lineament import open_log
 from lineament.cli import cli
 from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.believed import believed
-from lineament.mapping.drive_map import Drive
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import apart, beside, between, boxes_of, parts_of
@@ -149,10 +149,8 @@ def test_boxes_lie_in_a_row_beside_those_that_stay():
 
 
 def mapped(scans, odometry):
-    placed, extract = Drive(), Extractor()
-    for scan, pose in zip(scans, odometry, strict=True):
-        placed.add(scan, extract(scan), pose)
-    return make_map(placed.frames, placed.scans)
+    drive = placed(scans, odometry)
+    return make_map(drive.frames, drive.scans)
 
 
 def errors_by_part(made, truth):
@@ -218,13 +216,13 @@ def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
     assert ends[0][:, 0].max() < ends[1][:, 0].min()
     # Of the upper floor the plan of the lower one says nothing: it stays beside it.
     plan = LineMap.from_lines(ground.plan.segments, side=1)
-    placed = onto_plan(made, plan, placements(made, plan))
-    assert placed.located == (0,)
-    off = [relative(a, b) for a, b in zip(truth, placed.poses, strict=False)]
+    on_plan = onto_plan(made, plan, placements(made, plan))
+    assert on_plan.located == (0,)
+    off = [relative(a, b) for a, b in zip(truth, on_plan.poses, strict=False)]
     assert np.hypot(*np.array(off)[:, :2].T).max() < 0.1
-    beyond = placed.map.ends[placed.walls_of == 1].reshape(-1, 2)[:, 0]
+    beyond = on_plan.map.ends[on_plan.walls_of == 1].reshape(-1, 2)[:, 0]
     assert beyond.min() > plan.ends[:, :, 0].max()
-    np.testing.assert_array_equal(placed.walls_of, made.walls_of)
+    np.testing.assert_array_equal(on_plan.walls_of, made.walls_of)
     # As one map with it, the upper floor is left out, and no wall of the lower one is missing.
     merged = merge_onto(made, plan, placements(made, plan))
     assert merged.made.located == (0,)
@@ -247,10 +245,8 @@ def test_two_floors_are_two_parts_with_odometry_that_stands_still_in_the_lift():
 def test_odometry_over_a_lost_key_frame_is_believed_unless_walls_deny_it():
     """What is seen after it goes on, lies where nothing was seen, or contradicts what was."""
     _, scans, _ = storey_driven(3, 60)
-    drive, extract = Drive(), Extractor()
-    for scan in scans:
-        drive.add(scan, extract(scan), scan.pose)
-    frames, poses = list(drive.frames), np.array([frame.pose for frame in drive.frames])
+    frames = placed(scans, [scan.pose for scan in scans]).frames
+    poses = np.array([frame.pose for frame in frames])
     frames[30] = replace(frames[30], is_lost=True)
     sights = sights_of([(frame.features.segments, frame.walls) for frame in frames], 0.01)
     lines = lines_of(sights, poses, int(sights["wall"].max()) + 1)

@@ -27,7 +27,7 @@ PLAN = plan_of(RING)
 POSES = np.array([(0.3, -0.2, 0.7), (1.0, 0.4, -2.0), (-1.5, 0.1, 3.0)])
 
 
-def sights_from(poses, sigma=0.01):
+def sights_from(poses):
     """What is seen of each wall of the room from each pose, at places along it."""
     seen = [query_at(tuple(pose), PLAN).walls for pose in poses]
     sights = np.zeros((len(poses), len(RING)), SIGHT)
@@ -36,7 +36,7 @@ def sights_from(poses, sigma=0.01):
         u = np.column_stack((np.cos(walls["angle"]), np.sin(walls["angle"])))
         sights["centroid"][k], sights["angle"][k] = walls["centroid"] + 0.2 * k * u, walls["angle"]
         sights["ends"][k] = (-0.3, 0.2)
-    sights["covariance"] = np.diag((sigma, 2 * sigma)) ** 2
+    sights["covariance"] = np.diag((0.01, 0.02)) ** 2
     return sights.ravel()
 
 

@@ -18,10 +18,10 @@ SPREAD = np.array([[4.0, 1.0, -0.5], [1.0, 2.0, 0.3], [-0.5, 0.3, 1.0]]) * 1e-4
 MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5), (3, 0.5, 1.6e-4)]
 
 
-def derivative(function, at, step=1e-6):
+def derivative(function, at):
     columns = [
-        (np.array(function(at + offset)) - function(at - offset)) / (2 * step)
-        for offset in np.eye(len(at)) * step
+        (np.array(function(at + offset)) - function(at - offset)) / 2e-6
+        for offset in np.eye(len(at)) * 1e-6
     ]
     return np.transpose(columns)
 
@@ -45,8 +45,7 @@ def test_derivatives_are_those_of_differences(motion):
     )
 
 
-@pytest.mark.slow
-def test_the_pose_and_its_covariance_add_up():
+def test_the_pose_adds_up():
     odometer, truth = Odometer(), (0.0, 0.0, 0.0)
     first = odometer(tracks(None), 5.0)
     assert (first.pose, first.twist) == ((0, 0, 0), (0, 0, 0))
@@ -57,17 +56,6 @@ def test_the_pose_and_its_covariance_add_up():
         truth = compose(truth, motion)
         assert travel.pose == pytest.approx(truth)
         assert travel.twist == pytest.approx(twist_between((0, 0, 0), motion, 0.1))
-    rng = np.random.default_rng(0)
-    ends = []
-    for _ in range(20_000):
-        pose = (0.0, 0.0, 0.0)
-        for motion in MOTIONS[:3]:
-            pose = compose(pose, tuple(rng.multivariate_normal(motion, SPREAD)))
-        ends.append(np.subtract(pose, truth))
-    spread = np.cov(np.transpose(ends))
-    # Of 20 000 draws a variance is known to 1 %: white, what was drawn has unit covariance.
-    white = np.linalg.inv(np.linalg.cholesky(travel.covariance))
-    np.testing.assert_allclose(white @ spread @ white.T, np.eye(3), atol=0.05)
 
 
 @pytest.mark.parametrize(("stamp", "moves"), [(5.1, True), (5.0, False), (4.9, False), (5.001, 0)])
@@ -124,16 +112,17 @@ def test_the_skew_of_a_sweep_adds_up_and_is_in_the_covariance(sweep):
     assert travel.pose == known.pose
 
 
-def test_what_is_not_deskewed_adds_up():
+@pytest.mark.parametrize("sweep", [0.0, 0.5])
+def test_covariances_and_what_is_not_deskewed_add_up(sweep):
     """Half a circle takes half of the time from scan to scan: each motion is off by its share."""
     odometer, pose = Odometer(), (0.0, 0.0, 0.0)
     odometer(tracks(None), 5.0)
     spread, skew = np.zeros((3, 3)), np.zeros(3)
     for k, motion in enumerate(MOTIONS[:3], 1):
-        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.0 + k, sweep=0.5)
+        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.0 + k, sweep=sweep)
         of_pose, of_motion = compose_jacobians(pose, motion)
         spread = of_pose @ spread @ of_pose.T + of_motion @ SPREAD @ of_motion.T
-        skew = of_pose @ skew + of_motion @ (np.array(motion) * motion[2] * 0.5 / (2 * math.pi))
+        skew = of_pose @ skew + of_motion @ (np.array(motion) * motion[2] * sweep / (2 * math.pi))
         pose = compose(pose, motion)
         np.testing.assert_allclose(travel.covariance, spread + np.outer(skew, skew), rtol=1e-9)
 

@@ -61,11 +61,11 @@ def at_length(ends):
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
 
 
-def seen_at(plan, place, near=0.1):
+def seen_at(plan, place):
     """Whether a wall of a plan passes near a place."""
     a, b = plan.ends[:, 0], plan.ends[:, 1]
     t = np.clip(((place - a) * (b - a)).sum(1) / ((b - a) ** 2).sum(1), 0, 1)
-    return bool((np.hypot(*(place - a - t[:, None] * (b - a)).T) < near).any())
+    return bool((np.hypot(*(place - a - t[:, None] * (b - a)).T) < 0.1).any())
 
 
 @pytest.mark.slow

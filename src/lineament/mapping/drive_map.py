@@ -12,6 +12,7 @@ from ..features import Features
 from ..kernels.mapping.beams import count_passes
 from ..motion.association import associate
 from ..motion.estimate import Motion
+from ..motion.odometry import covariance_grown
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from ..walls import Numbers, segments_of, wrapped
@@ -135,7 +136,7 @@ class Drive(InTurn):
                 scan, features, prior, wide, math.sqrt(spread[0, 0]) < _SOON
             )
             self._lasted += self._since(scan.stamp)
-            self._spread = self._spread + spread if by is None else _errors_of(by, *_ODOMETRY)
+            self._spread = self._spread + spread if by is None else covariance_grown(by, *_ODOMETRY)
             if is_lost:
                 motion = Motion(*prior, spread)
             elif by_beams is not None and not has_odometry:
@@ -148,7 +149,10 @@ class Drive(InTurn):
             off[2] = wrapped(off[2])
             is_bare = not (is_lost or has_odometry or motion.observable)
             beams_alone = self._around.beams_alone(scan, features, motion) if is_bare else None
-            self._key(features, motion, scan, (beams_alone, is_lost, has_odometry, off))
+            walls = np.full(len(features.segments), -1, np.int64)
+            known = motion.pose, motion, self._lasted, self._spread
+            found = beams_alone, is_lost, has_odometry, off
+            self._key(KeyFrame(len(self.scans), scan, features, walls, *known, *found))
             self._lasted, self._spread, self._from = 0.0, np.zeros((3, 3)), odometry
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
@@ -188,37 +192,29 @@ class Drive(InTurn):
         before, duration = self._last[2], self._since(stamp)
         if odometry is not None and self._last[1] is not None:
             step = relative(self._last[1], odometry)
-            return compose(before, step), _errors_of(step, *_ODOMETRY)
+            return compose(before, step), covariance_grown(step, *_ODOMETRY)
         least = min(0.02 + 0.4 * duration, 0.3), min(0.02 + 0.8 * duration, 0.7)
-        return compose(before, self._step), _errors_of(self._step, least, _CONTINUED)
+        return compose(before, self._step), covariance_grown(self._step, least, _CONTINUED)
 
-    def _key(
-        self,
-        features: Features,
-        motion: Motion,
-        scan: LaserScan,
-        found: tuple[Array | None, bool, bool, Array],
-    ) -> None:
+    def _key(self, key: KeyFrame) -> None:
         """Take a key frame; its segments are walls that are known, or new ones."""
-        here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
-        walls = np.full(len(features.segments), -1, np.int64)
-        _, is_lost, *_ = found
-        if is_lost:
+        walls = key.walls
+        if key.is_lost:
             self._first = len(self.frames)
         elif self.frames:
-            around = self._around.features.transform(*inverse(motion.pose))
-            before, now = associate(around, features, roughness=ROUGHNESS).segments.T
+            around = self._around.features.transform(*inverse(key.motion.pose))
+            before, now = associate(around, key.features, roughness=ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
-            is_gone = passed(around.segments, beams_of(features, scan))
+            is_gone = passed(around.segments, beams_of(key.features, key.scan))
             is_gone[before] = False
             self._gone.update(self._numbers[is_gone].tolist())
         is_unknown = walls < 0
         walls[is_unknown] = self._next + np.arange(is_unknown.sum())
         self._next += int(is_unknown.sum())
-        at, known = len(self.scans), (motion, self._lasted, self._spread, *found)
-        key = KeyFrame(at, scan, features, walls, here, *known)
+        if self.frames:
+            key.pose = compose(self.frames[-1].pose, key.motion.pose)
         self.frames.append(key)
-        self._far = [*self._far, looked(scan)][-REMEMBERED:]
+        self._far = [*self._far, looked(key.scan)][-REMEMBERED:]
         self._look_around()
 
     def _look_around(self) -> None:
@@ -245,11 +241,9 @@ class Drive(InTurn):
         self._around = Around.of(features, last.scan, views)
 
 
-def _errors_of(motion: Pose, least: tuple[float, float], growth: tuple[float, float]) -> Array:
-    """Return the covariance of a motion whose deviations grow with its way and its turn."""
-    way = least[0] + growth[0] * math.hypot(motion[0], motion[1])
-    turn = least[1] + growth[1] * abs(motion[2])
-    return np.diag((way, way, turn)) ** 2
+def steps_between(poses: Array) -> Array:
+    """Way to each pose from the one before (n,) [m]."""
+    return np.asarray(np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T))
 
 
 def turned(covariance: Array, angle: float) -> Array:

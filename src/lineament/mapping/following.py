@@ -12,7 +12,7 @@ from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker, Tracks
 from ..motion.deskew import beam_times, deskew
-from ..motion.odometry import compose_jacobians
+from ..motion.odometry import compose_covariances
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
@@ -152,7 +152,7 @@ class Follower(InTurn):
     @property
     def is_known(self) -> bool:
         """Whether the pose is known well enough to be followed."""
-        return self._verdict in (LOCATED, UNOBSERVED) and self._unsure < WORST
+        return self._verdict in (LOCATED, UNOBSERVED) and unsure(self._covariance) < WORST
 
     @property
     def twist(self) -> Twist | None:
@@ -227,10 +227,9 @@ class Follower(InTurn):
     def _move(self, motion: Pose, covariance: Array) -> None:
         """Go on by a motion."""
         way, turn = math.hypot(motion[0], motion[1]), abs(motion[2])
-        of_pose, of_motion = compose_jacobians(self._pose, motion)
         drift = np.diag((_DRIFT**2 * way,) * 2 + (_TURN_DRIFT**2 * (way + turn),))
-        self._covariance = (
-            of_pose @ self._covariance @ of_pose.T + of_motion @ (covariance + drift) @ of_motion.T
+        self._covariance = compose_covariances(
+            self._pose, self._covariance, motion, covariance + drift
         )
         self._pose = compose(self._pose, motion)
         self._since += way
@@ -238,15 +237,10 @@ class Follower(InTurn):
         if self._verdict in (LOCATED, UNOBSERVED):
             self._verdict = verdict_of(self._covariance)
 
-    @property
-    def _unsure(self) -> float:
-        """Largest deviation of the place [m]."""
-        return unsure(self._covariance)
-
     def _judge(self, features: Features) -> Evidence:
         """Return what the beams of a scan alone say of the pose."""
         beams = thinned(beams_of(features))
-        spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
+        spread = min(math.hypot(_TIGHT, unsure(self._covariance)), UNSURE)
         says = ON_DRAWING._replace(opens=self.plan.is_mapped)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread, says)
         odds, explained, short, contradicted = found[0].tolist()

@@ -98,11 +98,6 @@ def beside(walls: NDArray[np.void]) -> Numbers:
     return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
 
 
-def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
-    """Votes of the walls for each turn of the local map, by degrees, shape (360,), at most 1."""
-    return agreement(spectrum(local), spectrum(walls))
-
-
 def spectrum(walls: NDArray[np.void]) -> NDArray[np.complex128]:
     """Fourier transform of the lengths of walls by the degrees of their directions."""
     lengths = np.minimum(lengths_of(walls), 10.0)
@@ -114,7 +109,7 @@ def spectrum(walls: NDArray[np.void]) -> NDArray[np.complex128]:
 
 
 def agreement(local: NDArray[np.complex128], walls: NDArray[np.complex128]) -> Array:
-    """Votes for each turn by spectra of walls, as of `directions`."""
+    """Votes for each turn of a local map, by degrees (360,), at most 1, by spectra of walls."""
     turned = np.fft.irfft(local.conj() * walls * _SMOOTH, 360)
     return np.asarray(np.maximum(turned / turned.max(initial=1e-12), 0.0))
 

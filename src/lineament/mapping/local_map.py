@@ -12,7 +12,7 @@ from .._copies import InTurn, in_turn
 from ..features import Features
 from ..features.features import scan_of
 from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
-from ..motion.odometry import compose_jacobians
+from ..motion.odometry import compose_covariances, covariance_grown
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
@@ -22,11 +22,11 @@ from .hypotheses import anchors, meetings
 
 #: A scan is kept after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, 0.26
-#: Deviations of a motion by odometry and by features, least and by way or turn [m, m, rad]. What
-#: the features say is known by the walls already; the rest, of directions that are not observed,
-#: is the tracker's guess.
-ODOMETRY = (0.005, 0.1), (0.005, 0.1), (0.005, 0.1)
-UNSURE = (0.05, 1.0), (0.05, 1.0), (0.02, 0.2)
+#: Deviations of a motion by odometry and by features [m, rad], and their growth with way and turn.
+#: What the features say is known by the walls already; the rest, of directions that are not
+#: observed, is the tracker's guess.
+ODOMETRY = (0.005, 0.005), (0.1, 0.1)
+UNSURE = (0.05, 0.02), (1.0, 0.2)
 #: How far a sensor may go between scans in a direction that is not observed [m].
 FASTEST = 0.5
 #: One beam is kept for each square of so much [m] in which beams end, and at most so many.
@@ -153,15 +153,13 @@ class LocalMap(InTurn):
         moved, sure = motion.pose, UNSURE
         if odometry is not None and before.odometry is not None:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
-        way, turn = math.hypot(*moved[:2]), abs(moved[2])
-        least, growth = np.array(sure).T
-        spread = np.diag(np.square(least + growth * (way, way, turn)))
+        spread = covariance_grown(moved, *sure)
         if sure is UNSURE:
             spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
-        of_pose, of_motion = compose_jacobians(before.motion, moved)
-        here.covariance = of_pose @ before.covariance @ of_pose.T + of_motion @ spread @ of_motion.T
+        here.covariance = compose_covariances(before.motion, before.covariance, moved, spread)
         here.motion = compose(before.motion, moved)
-        here.way, here.turn = before.way + way, before.turn + turn
+        here.way = before.way + math.hypot(*moved[:2])
+        here.turn = before.turn + abs(moved[2])
         sights.append(here)
         while len(sights) > 1 and self._way > self.way:
             del sights[0]

@@ -1,7 +1,8 @@
 """Loops: places that were seen before, found by `locate` alone."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ..scan.poses import relative
 from ..walls import Numbers, Records, moved
 from ..walls.sights import walls_along
 from .adjust import edges_of
-from .drive_map import KeyFrame
+from .drive_map import KeyFrame, steps_between
 from .line_map import LineMap
 from .local_map import Query, beams_of, moved_beams, thinned
 from .locate import located_near
@@ -28,7 +29,7 @@ _STRETCHES, _NEAR, _FARTHEST, _SCANS = 3, 2.0, 25.0, 6
 FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Survey:
     """Key frames, their poses (n, 3), what they saw, and the lines of its walls."""
 
@@ -36,16 +37,13 @@ class Survey:
     poses: Array
     sights: Records
     lines: Records
-    _way: Array | None = field(default=None, init=False)
 
-    @property
+    @cached_property
     def way(self) -> Array:
         """Way to each key frame [m]; where it was lost, what was seen before is far."""
-        if self._way is None:
-            steps = np.hypot(*np.diff(self.poses[:, :2], axis=0, prepend=self.poses[:1, :2]).T)
-            steps[[frame.is_torn for frame in self.frames]] = _BEFORE
-            self._way = np.cumsum(steps)
-        return self._way
+        steps = steps_between(self.poses)
+        steps[[frame.is_torn for frame in self.frames]] = _BEFORE
+        return np.cumsum(steps)
 
     def pose(self, k: int) -> Pose:
         """Pose of a key frame."""

@@ -18,7 +18,7 @@ from .adjust import Adjusted, edges_of, optimise
 from .again import tied
 from .believed import believed
 from .chain import TWICE, found_back, loosened, slid, spread_of, unseen
-from .drive_map import KeyFrame
+from .drive_map import KeyFrame, steps_between
 from .gone import standing
 from .grids import GRID_ENDINGS
 from .index import MAPPED
@@ -113,9 +113,8 @@ class DriveMap:
     @property
     def _steps(self) -> Array:
         """Way to each key frame from the one before, if both are of one part [m]."""
-        poses, numbers = self.survey.poses, self.parts.numbers
-        steps = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
-        return np.where(np.diff(numbers, prepend=0) == 0, steps, 0.0)
+        is_one = np.diff(self.parts.numbers, prepend=0) == 0
+        return np.where(is_one, steps_between(self.survey.poses), 0.0)
 
 
 def make_map(
@@ -158,8 +157,10 @@ def make_map(
         survey = tied(survey, tight, chain, parts.roots)
     # Misfits widen the covariances only here: from the start, they have right loops refused.
     bent = [(widened(segments), walls) for segments, walls in seen]
-    again = relabelled(sights_of(bent, rough), survey.sights)
-    sights = relabelled(sights_of(bent, roughness(again, survey.poses, rough)), again)
+    again = sights_of(bent, rough)
+    again["wall"] = survey.sights["wall"]
+    sights = sights_of(bent, roughness(again, survey.poses, rough))
+    sights["wall"] = again["wall"]
     found = optimise(survey.poses, chain, sights, held=parts.roots, rounds=2)
     found = as_known(found, loosened(chain, unknown), sights, parts.roots)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights, track))
@@ -226,12 +227,6 @@ def single(walls: Records) -> Records:
         long = last - first >= np.minimum(SHORTEST, lengths[k])
         kept = np.append(kept, cut(walls[k], first[long], last[long]))
     return kept
-
-
-def relabelled(sights: Records, like: Records) -> Records:
-    """Return the sights with the walls of others, of the same segments."""
-    sights["wall"] = like["wall"]
-    return sights
 
 
 def roughness(sights: Records, poses: Array, before: float) -> float:

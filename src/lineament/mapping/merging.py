@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from ..scan import Array
 from ..walls import Numbers, Records, bent, covariance_at, lengths_of, shared, summed, unit, wrapped
-from ..walls.sights import GAP, SIGHT, lines_of
+from ..walls.sights import GAP, SIGHT, lines_of, squared_misfits
 
 #: Lines whose directions differ by more are never one: they are not of one side of a wall [rad].
 _TURN = 0.35
@@ -74,10 +74,8 @@ def squares_of_places(
 
 def roughness(segments: Records) -> Array:
     """Return the squared misfits (n,) of segments, less what noise alone explains [m²]."""
-    misfit = segments["misfit"] ** 2
-    noise = np.maximum(segments["rms"] ** 2 - misfit, 0.0)
-    points = np.maximum(segments["n_points"], 1)
-    return np.asarray(np.maximum(misfit - noise / np.sqrt(np.pi * points), 0.0))
+    misfit, noise = squared_misfits(segments)
+    return np.asarray(np.maximum(misfit - noise, 0.0))
 
 
 def fused_segments(segments: Records, labels: Numbers) -> tuple[Records, NDArray[np.bool_]]:

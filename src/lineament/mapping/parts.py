@@ -11,7 +11,7 @@ from ..scan import Array
 from ..walls import Numbers, Records, unit
 from ..walls.sights import placed
 from .adjust import Adjusted, edges_of, errors_of_motions
-from .drive_map import UNKNOWN
+from .drive_map import UNKNOWN, steps_between
 from .following import UNSURE, WORST, WORST_TURN
 
 #: A part is of so much way; less is not sure of itself [m].
@@ -79,8 +79,7 @@ def parts_of(found: Adjusted, chain: Records, is_doubted: NDArray[np.bool_]) -> 
     is_weak[is_weak] = ~_known(between(found.poses, chain["ends"][is_weak], solve), UNSURE)
     cuts = np.flatnonzero(is_weak | is_doubted[1:]) + 1
     runs = np.column_stack((np.append(0, cuts), np.append(cuts, n) - 1))
-    steps = np.hypot(*np.diff(found.poses[:, :2], axis=0, prepend=found.poses[:1, :2]).T)
-    way = np.cumsum(steps)
+    way = np.cumsum(steps_between(found.poses))
     ways = way[runs[:, 1]] - way[runs[:, 0]]
     runs = runs[ways >= _LEAST] if ways.max() >= _LEAST else runs[[ways.argmax()]]
     labels, numbers = _joined(found.poses, runs, solve), np.zeros(n, np.int64)

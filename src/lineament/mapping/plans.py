@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,24 +96,15 @@ def read_table(path: str | os.PathLike[str], limits: Limits) -> tuple[Features, 
     except (pa.ArrowException, ValueError, UnicodeDecodeError) as problem:
         raise error(f"is no table of features: {problem}") from None
     values = {name: _numbers(table[name]) for name in _columns()}
-    found, left_out = {}, 0
-    for dtype, kind in ((SEGMENT, "segment"), (ARC, "arc")):
-        rows = _equal(table["kind"], kind)
-        records = _records(dtype, values, rows)
+    found: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
+    left_out = 0
+    for name, kind, dtype in (("segments", "segment", SEGMENT), ("arcs", "arc", ARC)):
+        records = _records(dtype, values, _equal(table["kind"], kind))
         good = _are_possible(records)
-        found[kind], left_out = records[good], left_out + int((~good).sum())
-    if left_out and not len(found["segment"]):
+        found[name], left_out = records[good], left_out + int((~good).sum())
+    if left_out and not len(found["segments"]):
         raise error(f"has no walls: {left_out} rows have empty or impossible numbers")
-    nothing = {name: make_records(name, []) for name in TABLES}
-    features = Features(
-        segments=found["segment"],
-        corners=nothing["corners"],
-        edges=nothing["edges"],
-        arcs=found["arc"],
-        breakpoints=nothing["breakpoints"],
-        clusters=np.empty(0, np.int32),
-    )
-    return features, left_out
+    return Features(**found, clusters=np.empty(0, np.int32)), left_out
 
 
 def _columns() -> list[str]:

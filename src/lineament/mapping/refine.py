@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from ..kernels.mapping.refining import refine as kernel
 from ..motion.association import chi_square
 from ..scan import Array
+from ..walls import wrapped
 from .index import Index
 from .local_map import Query
 
@@ -32,7 +33,7 @@ def refined(
     information = np.zeros((len(found), 3, 3))
     settings = (*first, ROUGH, GATE, float(_ROUNDS))
     kernel(found, query.table, *index, settings, pairs, information)
-    found[:, 2] = np.remainder(found[:, 2] + np.pi, 2 * np.pi) - np.pi
+    found[:, 2] = wrapped(found[:, 2])
     return found, pairs, information
 
 

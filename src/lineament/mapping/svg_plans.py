@@ -35,9 +35,7 @@ def read_svg(path: str | os.PathLike[str], limits: Limits) -> Drawn:
         raise error("is no plan that lineament wrote: in an SVG it looks for its own layers")
     limits.check("walls", len(layers["walls"]) + len(layers["arcs"]), error)
     try:
-        lines = [
-            [float(row.attrib[k]) for k in ("x1", "y1", "x2", "y2")] for row in layers["walls"]
-        ]
+        lines = [[float(row.attrib[k]) for k in _ENDS] for row in layers["walls"]]
         circles = [_circle(row) for row in layers["arcs"]]
     except (KeyError, ValueError, TypeError) as problem:
         raise error(f"is no plan that lineament wrote: {problem!r}") from None

@@ -19,6 +19,7 @@ from ..scan import Array, Pose
 from .association import chi_square
 from .estimate import Motion
 from .mounting import HINT, Fit, Model, fitted, heading_of
+from .relocation import wrapped
 
 #: What is estimated; the last three are as the others where there is a track.
 _NAMES, _OF_WHEELS = ("x", "y", "theta", "way", "turn", "drift"), ("left", "right", "track")
@@ -162,7 +163,7 @@ def joined(found: Calibration, sights: Sequence[Motion]) -> tuple[Calibration, i
     degrees, weights = np.array([3 - len(s.unobserved) for s in sights]), np.linalg.inv(spread)
     for _ in range(_JOINING):
         off = measured - values
-        off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+        off[:, 2] = wrapped(off[:, 2])
         square = np.einsum("ni,nij,nj->n", off, weights, off)
         kept = square < chi_square(0.999, 3) * max(1.0, float(np.median(square)) / _MEDIAN)
         factor = max(1.0, float(square[kept].sum() / max(degrees[kept].sum() - 3, 1)))

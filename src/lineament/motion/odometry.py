@@ -75,10 +75,9 @@ class Odometer(InTurn):
         motion, duration, self._stamp = tracks.motion, stamp - last, stamp
         twist, twist_covariance = (0.0, 0.0, 0.0), np.eye(3) * FASTEST**2
         if motion is not None:
+            before = self._pose, self._covariance
+            self._covariance = compose_covariances(*before, motion.pose, motion.covariance)
             of_pose, of_motion = compose_jacobians(self._pose, motion.pose)
-            self._covariance = (
-                of_pose @ self._covariance @ of_pose.T + of_motion @ motion.covariance @ of_motion.T
-            )
             turns = min(sweep / duration, 1.0) / (2 * math.pi) if duration > 0 else 0.0
             skew = np.array(motion.pose) * motion.theta * turns
             self._skew = of_pose @ self._skew + of_motion @ skew
@@ -98,6 +97,21 @@ def compose_jacobians(pose: Pose, motion: Pose) -> tuple[Array, Array]:
     c, s = math.cos(pose[2]), math.sin(pose[2])
     of_pose = np.array([[1.0, 0.0, -s * dx - c * dy], [0.0, 1.0, c * dx - s * dy], [0, 0, 1.0]])
     return of_pose, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def compose_covariances(pose: Pose, known: Array, motion: Pose, spread: Array) -> Array:
+    """Covariance of a pose after a motion, to first order, by those of both."""
+    of_pose, of_motion = compose_jacobians(pose, motion)
+    return np.asarray(of_pose @ known @ of_pose.T + of_motion @ spread @ of_motion.T)
+
+
+def covariance_grown(
+    motion: Pose, least: tuple[float, float], growth: tuple[float, float]
+) -> Array:
+    """Covariance of a motion whose deviations [m, rad] grow with its way and its turn."""
+    way = least[0] + growth[0] * math.hypot(motion[0], motion[1])
+    turn = least[1] + growth[1] * abs(motion[2])
+    return np.diag((way, way, turn)) ** 2
 
 
 def covariance_of_twist(motion: Motion, duration: float) -> Array:

@@ -113,7 +113,7 @@ def _crossings(walls: Array, pairs: NDArray[np.int64]) -> tuple[Array, Array, Ar
     i, j = pairs
     angles, c, s = walls[:, at.ANGLE], walls[:, at.COS], walls[:, at.SIN]
     centroids = walls[:, at.CENTROID : at.CENTROID + 2]
-    turn = _wrapped(angles[j] - angles[i])
+    turn = wrapped(angles[j] - angles[i])
     sine = np.sin(turn)
     kept = np.abs(sine) > _CROSSING
     i, j, turn, sine = i[kept], j[kept], turn[kept], sine[kept]
@@ -128,7 +128,7 @@ def _motions(before: Array, now: Array) -> Array:
     points, directions, turns = _crossings(before, _pairs(len(before), ordered=False))
     others, now_directions, now_turns = _crossings(now, _pairs(len(now), ordered=True))
     i, j = np.nonzero(np.abs(turns[:, None] - now_turns) < 2 * TURNED)
-    theta = _wrapped(directions[i] - now_directions[j])
+    theta = wrapped(directions[i] - now_directions[j])
     c, s, (x, y) = np.cos(theta), np.sin(theta), others[j].T
     place = points[i] - np.column_stack((c * x - s * y, s * x + c * y))
     return np.column_stack((place, theta))
@@ -150,10 +150,10 @@ def _found_again(before: Array, now: Array, motions: Array) -> tuple[Array, Arra
 def _off(motions: Array, pose: Pose | Array) -> Array:
     """Differences (n, 3) of motions from one."""
     off: Array = motions - np.asarray(pose)
-    off[:, 2] = _wrapped(off[:, 2])
+    off[:, 2] = wrapped(off[:, 2])
     return off
 
 
-def _wrapped(angles: Array) -> Array:
-    wrapped: Array = np.remainder(angles + math.pi, 2 * math.pi) - math.pi
-    return wrapped
+def wrapped(angles: Array) -> Array:
+    """Angles in [-π, π)."""
+    return np.asarray(np.remainder(angles + math.pi, 2 * math.pi) - math.pi)

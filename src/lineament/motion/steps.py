@@ -13,6 +13,7 @@ from ..scan import Array, Pose
 from ..scan.poses import compose, poses_along, relative, twist_between
 from .association import associate
 from .estimate import Motion, estimate_motion
+from .odometry import covariance_grown
 from .tracker import Tracker
 
 #: A step is so long, or turns by so much [m, rad].
@@ -62,7 +63,8 @@ def steps_of(
         moved = compose(moved, motion.pose)
         if math.hypot(moved[0], moved[1]) < WAY and abs(moved[2]) < TURN:
             continue
-        motion = _matched(features[first], seen, moved, _near(moved), roughness)
+        spread = covariance_grown(moved, _NEAR, _GROWS)
+        motion = _matched(features[first], seen, moved, spread, roughness)
         if len(motion.unobserved) < 3:
             steps.ends.append((first, i))
             steps.odometry.append(np.array(odometry[first : i + 1]))
@@ -132,13 +134,6 @@ def shared_walls(
         if len(sight.unobserved) < 3:
             sights.append(sight)
     return sights
-
-
-def _near(guess: Pose) -> Array:
-    """Covariance of a step that was added up from scan to scan."""
-    (way, turn), (by_way, by_turn) = _NEAR, _GROWS
-    way, turn = way + by_way * math.hypot(guess[0], guess[1]), turn + by_turn * abs(guess[2])
-    return np.diag((way, way, turn)) ** 2
 
 
 def _matched(

@@ -62,10 +62,15 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
-    sights["misfit"] = segments["misfit"] ** 2
-    noise = np.maximum(segments["rms"] ** 2 - sights["misfit"], 0.0)
-    sights["noise"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
+    sights["misfit"], sights["noise"] = squared_misfits(segments)
     return sights[segments["length"] > SHORT]
+
+
+def squared_misfits(segments: Records) -> tuple[Array, Array]:
+    """Squared misfits of segments, and how much of them noise alone explains [m²]."""
+    misfit = segments["misfit"] ** 2
+    noise = np.maximum(segments["rms"] ** 2 - misfit, 0.0)
+    return misfit, noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
 
 
 def count_of(sights: Records) -> int:
@@ -179,11 +184,6 @@ def on_lines(lines: Records, w: Numbers, begin: Array, end: Array, views: Number
     return walls
 
 
-def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Records:
-    """Return the sights with one number for those walls that are the `same`."""
-    return renumbered(sights, same(sights, poses, lines, apart))
-
-
 def renumbered(sights: Records, pairs: Numbers) -> Records:
     """Return the sights with new numbers of walls, of which pairs (m, 2) are one."""
     labels, result = np.arange(count_of(sights)), sights.copy()
@@ -262,14 +262,14 @@ def bowed(walls: Records, sights: Records) -> Records:
 
 
 def joined(sights: Records, apart: float = 0.0, poses: Array = _HERE) -> tuple[Records, Records]:
-    """Return sights with the numbers of their walls, `merged` until none are one, and the lines.
+    """Return sights with the numbers of their walls, until none are the `same`, and the lines.
 
     There is at least one sight; without poses, they are in the frame of the walls.
     """
     before = -1
     while (count := count_of(sights)) != before:
         lines, before = lines_of(sights, poses, count), count
-        sights = merged(sights, poses, lines, apart)
+        sights = renumbered(sights, same(sights, poses, lines, apart))
     return sights, lines
 
 
