@@ -212,14 +212,16 @@ def numbered(features: Features) -> NDArray[np.void]:
     return kept
 
 
-def corner_figure(scan: LaserScan, features: Features, corner: int, *, title: str = "") -> Figure:
+def corner_figure(
+    scan: LaserScan, features: Features, corner: int, *, title: str = "", dark: bool = False
+) -> Figure:
     """Draw the surroundings of a corner, by its index, so large that its ellipse can be seen."""
     x, y = features.corners["position"][corner].tolist()
     sigma = math.sqrt(max(float(np.trace(features.corners["covariance"][corner])), 0.0))
     reach = float(np.clip(36 * sigma, 0.05, 2.0)) if math.isfinite(sigma) else 0.5
     points = np.array([(x - reach, y - reach), (x + reach, y + reach)])
     name, error = f"Corner at ({x:.3f}, {y:.3f}) m", f"1 σ of its position: {1e3 * sigma:.1f} mm"
-    return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, False, None)
+    return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, dark, None)
 
 
 def map_figure(
