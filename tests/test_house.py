@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ast
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+#: Packages whose names are imported when they are first used.
+LAZY = ("lineament", *(f"lineament.{name}" for name in ("checks", "live", "logs", "methods")))
+LAZY += ("lineament_lab.methods",)
 SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "lab" / "src").rglob("*.py")])
 TEXTS = [*(ROOT / "src").rglob("*.js"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
 PAGES = [*SOURCES, *sorted(TEXTS)]
@@ -57,3 +61,12 @@ def test_no_room_reaches_for_the_roof(path):
     tree = ast.parse(path.read_text(encoding="utf-8"))
     imported = [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
     assert not {"lineament", "lineament_lab"} & set(imported)
+
+
+@pytest.mark.parametrize("module", LAZY)
+def test_lazy_names_are_those_that_type_checkers_see(module):
+    """They let others use what is imported as the same name, and what is defined."""
+    lazy = import_module(module)
+    source = Path(lazy.__file__).read_text(encoding="utf-8")
+    seen = re.findall(r"\b(\w+) as \1\b|^(?:class |def )?(\w+)(?: =|\()", source, re.M)
+    assert {*lazy.__all__} - {one or other for one, other in seen} <= {"__version__"}

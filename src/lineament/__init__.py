@@ -16,16 +16,25 @@ from typing import TYPE_CHECKING
 from ._lazy import Pictured, lazily
 from ._version import __version__
 
-if TYPE_CHECKING:
-    from . import bounds, logs, methods, simulation
-    from .errors import LineamentError, LineamentWarning, LogError
-    from .extractor import Extractor, extract, trace
-    from .features import FeatureBatch, Features
-    from .logs import open_log
-    from .methods.trace import Trace
-    from .motion.deskew import deskew
-    from .motion.tracker import Tracker
-    from .scan import LaserScan, RangeNoise
+if TYPE_CHECKING:  # Under these very names: type checkers let others use no other ones.
+    from . import bounds as bounds
+    from . import logs as logs
+    from . import methods as methods
+    from . import simulation as simulation
+    from .errors import LineamentError as LineamentError
+    from .errors import LineamentWarning as LineamentWarning
+    from .errors import LogError as LogError
+    from .extractor import Extractor as Extractor
+    from .extractor import extract as extract
+    from .extractor import trace as trace
+    from .features import FeatureBatch as FeatureBatch
+    from .features import Features as Features
+    from .logs import open_log as open_log
+    from .methods.trace import Trace as Trace
+    from .motion.deskew import deskew as deskew
+    from .motion.tracker import Tracker as Tracker
+    from .scan import LaserScan as LaserScan
+    from .scan import RangeNoise as RangeNoise
     from .view.notebook import plot as plot
 
 _HOME = {
