@@ -385,7 +385,7 @@ def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
 
 def test_moving_scans_of_a_log_are_deskewed_by_its_poses():
     walk = [(-2.0, 0.0), (-1.0, 0.0)]
-    scans = list(drive(room(), walk, SENSORS["lms361"], speed=1.0, rate=10))
+    scans = list(drive(room(), walk, SENSORS["lms361"], speed=1.0, rate=10, moving=True))
     pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
     for scan in scans[:6]:
         frame = pipeline("one", scan)
@@ -397,7 +397,8 @@ def test_moving_scans_of_a_log_are_deskewed_by_its_poses():
 
 
 def test_a_scan_is_deskewed_by_the_motion_before_it_or_where_none_is_known_by_its_own():
-    scans = drive(room(), [(-2.0, 0.0), (-1.4, 0.1)], SENSORS["lms361"], speed=1.0, rate=10)
+    way, speed = [(-2.0, 0.0), (-1.4, 0.1)], 1.0
+    scans = drive(room(), way, SENSORS["lms361"], speed=speed, rate=10, moving=True)
     pipeline, extract, track = Pipeline(LiveConfig(deskew="scans")), ln.Extractor(), ln.Tracker()
     for k, scan in enumerate(scans):
         frame, before = pipeline("one", scan), track.twist
