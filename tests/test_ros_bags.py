@@ -365,7 +365,13 @@ def test_databases_that_are_strange(database, change, problem):
 def test_a_database_whose_damage_is_no_text(database):
     data = database.read_bytes()
     database.write_bytes(data.replace(b"CREATE TABLE messages", b"CREATE TABLE (\xdf ssages"))
-    check_refused(r"cannot be read as a ROS 2 bag \(sqlite3\)", database)
+    check_refused(r"cannot be read as a ROS 2 bag \(sqlite3: ", database)
+
+
+def test_a_database_that_is_cut_off_says_so(database):
+    whole = database.read_bytes()
+    database.write_bytes(whole[:-4096])
+    check_refused(rf"is cut off: ends at byte {len(whole) - 4096}", database)
 
 
 # --- recordings

@@ -270,7 +270,7 @@ def test_the_largest_record(bags, kind, monkeypatch):
         (b"#ROSBAG V2.0\n\0\0\0\0\0\0\0\0", "record without a right field op"),
         (b"\x89MCAP0\r\n", "ends without a footer: it is cut off, or still recorded"),
         (b"\x89MCAP0\r\n" + bytes(9), "record has the code 0"),
-        (b"SQLite format 3\0", r"cannot be read as a ROS 2 bag \(sqlite3\)|has: none"),
+        (b"SQLite format 3\0", r"cannot be read as a ROS 2 bag \(sqlite3: |has: none"),
     ],
 )
 def test_files_that_end_at_once(tmp_path, data, problem):

@@ -179,6 +179,7 @@ class Sqlite3Bag(Bag):
         """
         with reading(self.path):
             extent = _Extent(self.path, self.limits)
+            cut_off = f"is cut off: ends at byte {extent.size}" if extent.is_cut_off() else ""
         try:
             with extent.file, closing(sqlite3.connect(extent.uri, uri=True)) as database:
                 if not _shares(extent.path):  # Else it would keep its shared memory in a file.
@@ -186,8 +187,8 @@ class Sqlite3Bag(Bag):
                 database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, self.limits.piece)
                 database.execute("PRAGMA trusted_schema = OFF")
                 database.set_progress_handler(extent.look, _LOOK)
-                if extent.is_cut_off():
-                    fault(LogError(self.path, f"is cut off: ends at byte {extent.size}"))
+                if cut_off:
+                    fault(LogError(self.path, cut_off))
                 tables = {str(row[0]) for row in database.execute(_TABLES)}
                 if not {"topics", "messages"} <= tables:
                     names = ", ".join(sorted(tables)) or "none"
@@ -200,7 +201,7 @@ class Sqlite3Bag(Bag):
         except _BROKEN as error:
             if extent.is_endless:
                 raise extent.overrun() from None
-            problem = f"cannot be read as a ROS 2 bag (sqlite3): {error}"
+            problem = f"{cut_off or 'cannot be read as a ROS 2 bag'} (sqlite3: {error})"
             raise LogError(self.path, problem) from None
 
     def _connections(self, topics: Iterable[Any]) -> dict[int, Connection]:
