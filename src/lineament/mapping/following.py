@@ -178,9 +178,7 @@ class Follower(InTurn):
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
-        x, y, _ = compose((0.0, 0.0, self._pose[2]), skew)
-        off = np.array((x, y, skew[2]))
-        blurred = np.outer(off, off)
+        blurred = _blur(self._pose, skew)
         evidence = self._judge(features)
         if self._missed > MOST_MISSED or was_known > self.is_known:
             # What was seen before may be of another place: this scan begins anew.
@@ -305,8 +303,19 @@ def follow(
             now = np.array(twist or (0.0, 0.0, 0.0))
             skew = (np.abs(now - last) + _UNEVEN * np.abs(now)) * np.ptp(times) / 2
             last = now
-        x, y, turn = skew.tolist()
-        yield scan, follower(extractor(straight), pose, (x, y, turn))
+        where = follower(extractor(straight), pose, tuple(skew.tolist()))
+        if pose is None and skew.any() and follower.twist is not None:
+            # Without odometry what was seen says how it went: not as it did before, perhaps.
+            amiss = np.abs(np.subtract(follower.twist, now)) * np.ptp(times) / 2
+            amiss = _blur(where.pose, tuple(amiss.tolist()))
+            where = replace(where, covariance=where.covariance + amiss)
+        yield scan, where
+
+
+def _blur(pose: Pose, skew: Pose) -> Array:
+    """Covariance of a scan that as a whole is off by so much in its own frame."""
+    x, y, _ = compose((0.0, 0.0, pose[2]), skew)
+    return np.outer((x, y, skew[2]), (x, y, skew[2]))
 
 
 def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:
