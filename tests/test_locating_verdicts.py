@@ -11,7 +11,7 @@ from small_room import RING, plan_of, query_at
 from lineament import LaserScan
 from lineament.mapping import LineMap, Query, locate
 from lineament.mapping.evidence import Evidence
-from lineament.mapping.following import follow
+from lineament.mapping.following import Whereabouts, follow
 from lineament.mapping.hypotheses import BOX, TURN
 from lineament.mapping.index import MAPPED
 from lineament.mapping.locate import (
@@ -265,23 +265,30 @@ def test_a_turn_is_found_at_once_by_the_angles(flipped):
 
 
 def test_how_far_a_sweep_may_be_off_as_a_whole(monkeypatch):
-    """By the change of the velocity and a tenth of it, over half the sweep of 0.1 s; 1 at first."""
-    twists, skews = iter([None, None, (2.0, 0.0, 0.5), (2.0, 0.0, 0.5)]), []
+    """By the change of the velocity and a tenth of it, over half the sweep of 0.1 s; 1 at first.
+
+    And by what the velocity turns out to be beside the one that it was deskewed by.
+    """
+    twists, skews = iter([None, (2.0, 0.0, 0.5), (2.0, 0.0, 0.5), None]), []
 
     class Stub:
+        twist = None
+
         def __init__(self, plan):
             assert plan is PLAN
-
-        @property
-        def twist(self):
-            return next(twists)
 
         def __call__(self, _, pose, skew):
             assert pose is None
             skews.append(skew)
+            self.twist = next(twists)
+            turned = 0.0, 0.0, math.pi / 2
+            return Whereabouts("located", turned, np.zeros((3, 3)), Evidence(9.0, 1.0, 0.0, 0.0, 9))
 
     monkeypatch.setattr("lineament.mapping.following.Follower", Stub)
     scan = LaserScan([2.0] * 11, 0.0, 0.1, time_increment=0.01)
-    list(follow([scan] * 4, PLAN, lambda straight: straight, odometry=False))
+    found = list(follow([scan] * 4, PLAN, lambda straight: straight, odometry=False))
     expected = [(0.05, 0, 0.05), (0, 0, 0), (0.11, 0, 0.0275), (0.01, 0, 0.0025)]
     np.testing.assert_allclose(skews, expected, atol=1e-12)
+    late = np.zeros((4, 3, 3))
+    late[1] = np.outer((0, 0.1, 0.025), (0, 0.1, 0.025))
+    np.testing.assert_allclose([where.covariance for _, where in found], late, atol=1e-12)

@@ -299,16 +299,17 @@ def follow(
             twist = twist_between(before[0], pose, scan.stamp - before[1])
         before = None if pose is None else (pose, scan.stamp)
         straight = deskew(scan, twist) if deskewed else scan
-        if deskewed and (times := beam_times(scan)) is not None:
+        times = beam_times(scan) if deskewed else None
+        if times is not None:
             now = np.array(twist or (0.0, 0.0, 0.0))
             skew = (np.abs(now - last) + _UNEVEN * np.abs(now)) * np.ptp(times) / 2
             last = now
-        where = follower(extractor(straight), pose, tuple(skew.tolist()))
-        if pose is None and skew.any() and follower.twist is not None:
+        x, y, turn = skew.tolist()
+        where = follower(extractor(straight), pose, (x, y, turn))
+        if times is not None and pose is None and follower.twist is not None:
             # Without odometry what was seen says how it went: not as it did before, perhaps.
-            amiss = np.abs(np.subtract(follower.twist, now)) * np.ptp(times) / 2
-            amiss = _blur(where.pose, tuple(amiss.tolist()))
-            where = replace(where, covariance=where.covariance + amiss)
+            x, y, turn = (np.abs(np.subtract(follower.twist, last)) * np.ptp(times) / 2).tolist()
+            where = replace(where, covariance=where.covariance + _blur(where.pose, (x, y, turn)))
         yield scan, where
 
 
