@@ -96,6 +96,14 @@ def test_fields_are_those_of_their_scan_whenever_they_are_asked_for(copied, nois
         assert not hasattr(features, "lines")
 
 
+def test_a_table_that_is_set_counts():
+    found = ln.extract(ln.LaserScan([2.0] * 9 + [3.0] * 9, -0.09, 0.01))
+    assert found.counts()["segments"] == 2
+    found.segments = found.segments[:1]
+    assert found.counts()["segments"] == 1
+    assert found.to_arrow()["kind"].to_pylist().count("segment") == 1
+
+
 def test_batch_views():
     ranges = np.array([[np.nan] * 9, [2.0] * 9, [1.0] * 4 + [3.0] * 5, [np.inf] * 9])
     batch = ln.Extractor("liu", noise=NOISE).batch(

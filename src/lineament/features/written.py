@@ -72,9 +72,10 @@ class LazyFields:
         """Return the bytes of a table, or of the clusters, of which no array need be made."""
         k, dtype = _PARTS[name]
         try:
+            made = object.__getattribute__(self, name)
+        except AttributeError:
             return self._written[k]
-        except AttributeError:  # made by its fields, or a copy
-            return np.asarray(getattr(self, name), dtype).tobytes()
+        return np.asarray(made, dtype).tobytes()
 
     def counts(self) -> dict[str, int]:
         """Return how many features there are, by table.
