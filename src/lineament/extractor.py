@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from typing import Any, cast
 
 import numpy as np
@@ -310,13 +310,18 @@ def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
             "batch takes no LaserScan, expected a matrix of ranges, one scan a row, with "
             "angle_min=... and angle_increment=...; an extractor itself takes a scan"
         )
-    if isinstance(ranges, list | tuple) and len({*map(np.size, ranges)}) > 1:
-        row = next(i for i, each in enumerate(ranges) if np.size(each) != np.size(first))
+    try:
+        rows = numbers("ranges", ranges)
+    except ValueError:
+        rows_given = ranges if isinstance(ranges, list | tuple) else []
+        sizes = [len(row) if isinstance(row, Sized) else 0 for row in rows_given]
+        other = next((i for i, size in enumerate(sizes) if size != sizes[0]), None)
+        if other is None:
+            raise
         raise ValueError(
-            f"ranges has {np.size(first)} in row 0 and {np.size(ranges[row])} in row {row}, "
+            f"ranges has {sizes[0]} in row 0 and {sizes[other]} in row {other}, "
             "expected as many in each: scans of one scanner"
-        )
-    rows = numbers("ranges", ranges)
+        ) from None
     if rows.ndim != 2:
         raise ValueError(f"ranges has shape {rows.shape}, expected (m, n): one scan a row")
     return rows
