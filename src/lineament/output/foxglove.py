@@ -19,7 +19,7 @@ class FoxgloveMessages(SceneMessages):
     Beams that are not valid are NaN: the message has no limits of the range to exclude them.
     """
 
-    encoding, profile = "protobuf", ""
+    encoding, profile, drawn = "protobuf", "", "features"
 
     def schema(self, kind: str) -> tuple[str, str, bytes]:
         """Name, encoding and text of the schema of a message, by its name."""

@@ -39,6 +39,8 @@ class RosMessages(SceneMessages):
     with those of Noetic. Ranges are those of the scan, invalid ones too.
     """
 
+    drawn = "markers"
+
     def __init__(self, encoding: str = "cdr") -> None:
         WireWriter(encoding)  # raises if there is no such encoding
         self._version = 2 if encoding == "cdr" else 1

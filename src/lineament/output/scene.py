@@ -111,13 +111,15 @@ class SceneMessages(ABC):
     encoding: str
     #: Profile of an MCAP file with these messages: ``ros2``, ``ros1`` or "".
     profile: str
+    #: Last word of the topic of what was found: that under which the live node has such messages.
+    drawn: str
 
     def messages(
         self, topic: str, moment: Moment, scan: LaserScan, layers: tuple[Layer, ...]
     ) -> Iterator[Message]:
         """Make all messages of a scan: where it was taken, the scan, and what was found in it.
 
-        The scan goes to its own topic, the layers of its features to ``TOPIC/features``, the
+        The scan goes to its own topic, the layers of its features to `drawn` below it, the
         transform, where it has a pose, to ``/tf``. A scan with irregular bearings is no message of
         a laser scan: its valid points go to ``TOPIC/points``.
         """
@@ -128,7 +130,7 @@ class SceneMessages(ABC):
             yield self.scan(topic, moment, scan)
         else:
             yield self.points(f"{topic}/points", moment, scan)
-        yield self.features(f"{topic}/features", moment, layers)
+        yield self.features(f"{topic}/{self.drawn}", moment, layers)
 
     @abstractmethod
     def schema(self, kind: str) -> tuple[str, str, bytes]:
