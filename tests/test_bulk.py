@@ -144,9 +144,10 @@ def test_a_log_has_one_file_whatever_format_it_had_before(logs, tmp_path):
     out = tmp_path / "out"
     extract_logs(logs, out, IEPF)
     other = [path for path in logs if path.stem != "a"]
+    (out / "log=b.npz" / "part-0.txt").write_text("a note of somebody's")
     extract_logs(other, out, IEPF, ending=".csv", resume=True)
     assert {path.name for path in (out / "log=a.npz").iterdir()} == {"part-0.parquet"}
-    assert {path.name for path in (out / "log=b.npz").iterdir()} == {"part-0.csv"}
+    assert {path.name for path in (out / "log=b.npz").iterdir()} == {"part-0.csv", "part-0.txt"}
 
 
 def test_logs_of_one_name_stay_apart_and_keep_their_names(tmp_path):

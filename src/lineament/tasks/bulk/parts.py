@@ -13,6 +13,7 @@ from ...extractor import Extractor
 from ...files import made_folder
 from ...logs.sources import is_address
 from ...methods import Method
+from ...output import ENDINGS
 from ...progress import Track
 from ...scan import RangeNoise
 from ..extract import Extraction, extract_log
@@ -67,7 +68,8 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
         row = replace(row, warnings=warnings)
         written = part.stat().st_size
         for former in part.parent.glob("part-0.*"):
-            if former != part:  # in another format: the data set has one file of each log
+            # In another format: the data set has one file of each log.
+            if former != part and former.name.removeprefix("part-0") in ENDINGS:
                 former.unlink()
     except LineamentError as error:
         row = failed(row, str(error))

@@ -80,9 +80,10 @@ def extract_logs(
     """Extract the features of many logs into a partitioned data set, one file a log.
 
     The file of a log is ``log=NAME/part-0.parquet``: Arrow, DuckDB and Spark read the folder as one
-    table with a column ``log``. Logs extracted into the folder before stay in it. The manifest
-    records each log as soon as it ends; a log that fails stops no other. Tables depend neither on
-    the executor nor on the order of the logs.
+    table with a column ``log``. Logs extracted into the folder before stay in it; of the same log,
+    a file with another ending is removed once the new one is whole. The manifest records each log
+    as soon as it ends; a log that fails stops no other. Tables depend neither on the executor nor
+    on the order of the logs.
 
     Parameters
     ----------
