@@ -22,7 +22,8 @@ from lineament.live.sinks import FoxgloveSink, RosSink
 from lineament.logs import save_npz
 from lineament.mapping import LineMap
 from lineament.mapping.evidence import Evidence
-from lineament.mapping.following import Follower, Whereabouts, combined, follow
+from lineament.mapping.following import Follower, Whereabouts, follow
+from lineament.motion.odometry import combined
 from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room

@@ -272,7 +272,7 @@ def test_how_far_a_sweep_may_be_off_as_a_whole(monkeypatch):
     twists, skews = iter([None, (2.0, 0.0, 0.5), (2.0, 0.0, 0.5), None]), []
 
     class Stub:
-        twist = None
+        twist, believes_odometry = None, True
 
         def __init__(self, plan):
             assert plan is PLAN

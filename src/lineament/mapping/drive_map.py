@@ -20,6 +20,7 @@ from ..walls.sights import WHOLE, lines_of, sights_of, walls_along
 from .around import ROUGHNESS, USUAL, Around
 from .local_map import beams_of
 from .views import looked, views_of
+from .wheels import OdometryCheck
 
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
@@ -120,12 +121,14 @@ class Drive(InTurn):
         self._evidence = np.array((0.0, 1.0, 0.0, 0.0))
         #: Odometry at the last key frame.
         self._from: Pose | None = None
+        self._check = OdometryCheck()
         #: Time from scan to scan, on average.
         self._pace = 1.0
 
     @in_turn
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> Step:
         """Add the next scan; return where it was taken."""
+        odometry = self._check(scan, odometry)
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         has_odometry = odometry is not None and self._last[1] is not None
         by = self._by_odometry(odometry) if has_odometry else None

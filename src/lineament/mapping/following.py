@@ -12,7 +12,7 @@ from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker, Tracks
 from ..motion.deskew import beam_times, deskew
-from ..motion.odometry import compose_covariances
+from ..motion.odometry import combined, compose_covariances
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
@@ -21,6 +21,7 @@ from .evidence import ON_DRAWING, Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import FASTEST, LocalMap, beams_of, thinned
 from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
+from .wheels import OdometryCheck
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -123,6 +124,7 @@ class Follower(InTurn):
         self.plan, self.way = plan, way
         self._stamp = math.nan
         self._odometry: Pose | None = None
+        self._check = OdometryCheck()
         self._scan: LaserScan | None = None
         self._restart()
 
@@ -155,6 +157,11 @@ class Follower(InTurn):
         return self._verdict in (LOCATED, UNOBSERVED) and unsure(self._covariance) < WORST
 
     @property
+    def believes_odometry(self) -> bool:
+        """Whether the odometry went with the scans so far: else it is left out."""
+        return self._check.is_believed
+
+    @property
     def twist(self) -> Twist | None:
         """Velocity of the sensor in the last scans, as `deskew` takes it."""
         return self._tracker.twist
@@ -174,6 +181,8 @@ class Follower(InTurn):
         skew : (x, y, theta)
             What the scan as a whole may be off, as the sensor moved while it swept [m, m, rad].
         """
+        if features.scan is not None:
+            odometry = self._check(features.scan, odometry)
         tracks, was_known = self._tracked(features, odometry), self.is_known
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
@@ -294,7 +303,8 @@ def follow(
     """
     follower, before, last = Follower(plan), None, _USUAL
     for scan in scans:
-        pose, twist, skew = scan.pose if odometry else None, follower.twist, np.zeros(3)
+        given, twist, skew = scan.pose if odometry else None, follower.twist, np.zeros(3)
+        pose = given if follower.believes_odometry else None
         if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
             twist = twist_between(before[0], pose, scan.stamp - before[1])
         before = None if pose is None else (pose, scan.stamp)
@@ -305,7 +315,7 @@ def follow(
             skew = (np.abs(now - last) + _UNEVEN * np.abs(now)) * np.ptp(times) / 2
             last = now
         x, y, turn = skew.tolist()
-        where = follower(extractor(straight), pose, (x, y, turn))
+        where = follower(extractor(straight), given, (x, y, turn))
         if times is not None and pose is None and follower.twist is not None:
             # Without odometry what was seen says how it went: not as it did before, perhaps.
             x, y, turn = (np.abs(np.subtract(follower.twist, last)) * np.ptp(times) / 2).tolist()
@@ -317,20 +327,3 @@ def _blur(pose: Pose, skew: Pose) -> Array:
     """Covariance of a scan that as a whole is off by so much in its own frame."""
     x, y, _ = compose((0.0, 0.0, pose[2]), skew)
     return np.outer((x, y, skew[2]), (x, y, skew[2]))
-
-
-def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:
-    """Combine two poses, each with its covariance, whose errors may be the same ones.
-
-    Covariance intersection (Julier and Uhlmann 1997): of the weighted means that never claim too
-    much, that of the least determinant.
-    """
-    of_known, of_other = np.linalg.inv(known[1]), np.linalg.inv(other[1])
-    weights = np.linspace(0.0, 1.0, 21)[:, None, None]
-    sums = (1 - weights) * of_known + weights * of_other
-    best = int(np.linalg.det(sums).argmax())
-    covariance = np.linalg.inv(sums[best])
-    off = np.subtract(other[0], known[0])
-    off[2] = math.remainder(off[2], 2 * math.pi)
-    x, y, theta = (known[0] + weights[best, 0, 0] * covariance @ of_other @ off).tolist()
-    return (x, y, math.remainder(theta, 2 * math.pi)), covariance
