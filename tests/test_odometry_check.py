@@ -53,7 +53,7 @@ def test_wrong_odometry_is_left_out_and_warned_of_once(drive, kind, after):
 
 def test_the_cumulated_sum_by_hand(monkeypatch):
     holds = iter([False] * 5 + [True] + [False] * 3 + [True] * 24 + [False] + [True] * 2)
-    monkeypatch.setattr(wheels, "is_consistent", lambda *_: next(holds))
+    monkeypatch.setattr(wheels, "agreement", lambda *_: [0.85 if next(holds) else 0.84])
     check, scan = OdometryCheck(), ln.LaserScan([1.0], 0.0, 0.1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ln.LineamentWarning)
@@ -73,6 +73,17 @@ def test_odometry_that_goes_with_the_scans_again_is_believed_again(drive):
         known = believed(OdometryCheck(), turned + scans + scans[::-1])
     assert not known[60]
     assert all(known[130:])
+
+
+def test_scans_that_share_nothing_say_nothing(drive):
+    blind = ln.LaserScan(np.full(181, np.nan), -math.pi / 2, math.pi / 180)
+    check = OdometryCheck()
+    for k in range(50):
+        check(blind, (float(k), 0.0, 0.0))
+    assert check.is_believed
+    with pytest.warns(ln.LineamentWarning, match=SAID):
+        known = believed(check, [s.with_pose(WRONG["mirrored"](s.pose)) for s in drive[1]])
+    assert known.index(False) == 26  # as if it had seen nothing before
 
 
 def test_scans_without_odometry_are_not_compared(drive):

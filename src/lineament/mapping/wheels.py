@@ -5,7 +5,7 @@ import math
 from ..errors import warn
 from ..scan import LaserScan, Pose
 from ..scan.poses import relative
-from .consistency import is_consistent
+from .consistency import LEAST, agreement
 
 #: Scans are compared after so much way or turn by odometry [m, rad].
 _WAY, _TURN = 0.5, math.radians(15.0)
@@ -53,12 +53,15 @@ class OdometryCheck:
         motion = relative(since, odometry)
         if math.hypot(motion[0], motion[1]) >= _WAY or abs(motion[2]) >= _TURN:
             self._since = scan, odometry
-            self._weigh(is_consistent(before, scan, motion))
+            self._weigh(agreement(before, scan, [motion])[0])
         return odometry if self.is_believed else None
 
-    def _weigh(self, holds: bool) -> None:
-        """Take in one more comparison."""
-        self._score = min(max(self._score + (_HELD if holds else _FAILED), 0.0), _MOST)
+    def _weigh(self, share: float) -> None:
+        """Take in one more comparison, by the share of explained ends; NaN says nothing."""
+        if math.isnan(share):
+            return
+        self._score += _FAILED if share < LEAST else _HELD
+        self._score = min(max(self._score, 0.0), _MOST)
         if self._score in (0.0, _MOST):
             self.is_believed = self._score == 0.0
         if not (self.is_believed or self._is_warned):
