@@ -7,8 +7,8 @@ from ..scan import LaserScan, Pose
 from ..scan.poses import relative
 from .consistency import LEAST, agreement
 
-#: Scans are compared after so much way or turn by odometry [m, rad].
-_WAY, _TURN = 0.5, math.radians(15.0)
+#: Scans are compared after so much way or turn by odometry, or time [m, rad, s].
+_WAY, _TURN, _TIME = 0.5, math.radians(15.0), 1.0
 #: Of odometry that is right, so large a share of the comparisons fails: wheels that slip, people.
 #: Of odometry that is wrong, half of them do: in bare corridors it may go with the scans.
 _RIGHT, _WRONG = 0.2, 0.5
@@ -23,10 +23,11 @@ class OdometryCheck:
     """Leaves out odometry that contradicts the scans, and warns of it once.
 
     Odometry of a scanner that is mounted otherwise than is said, or upside down, of other times or
-    of another robot does not help: scans are looked for where they are not. Each half metre, two
-    scans are compared by the motion that odometry says between them. Whether they contradict it
-    more often than those of wheels that slip is Page's test (1954), the cumulated sum of the log
-    likelihood ratios. Odometry that goes with the scans for as long again is believed again.
+    of another robot does not help, nor does one that stands still while the robot is pushed: scans
+    are looked for where they are not. Each half metre, or second, two scans are compared by the
+    motion that odometry says between them. Whether they contradict it more often than those of
+    wheels that slip is Page's test (1954), the cumulated sum of the log likelihood ratios. Odometry
+    that goes with the scans for as long again is believed again.
 
     Examples
     --------
@@ -51,7 +52,8 @@ class OdometryCheck:
             self._since = scan, odometry
         before, since = self._since
         motion = relative(since, odometry)
-        if math.hypot(motion[0], motion[1]) >= _WAY or abs(motion[2]) >= _TURN:
+        is_far = math.hypot(motion[0], motion[1]) >= _WAY or abs(motion[2]) >= _TURN
+        if is_far or abs(scan.stamp - before.stamp) >= _TIME:
             self._since = scan, odometry
             self._weigh(agreement(before, scan, [motion])[0])
         return odometry if self.is_believed else None
@@ -68,6 +70,6 @@ class OdometryCheck:
             self._is_warned = True
             warn(
                 "odometry contradicts the scans, and is left out where it does: is the scanner "
-                "mounted otherwise (laser_pose) or upside down, are its times or units others? "
+                "mounted otherwise (laser_pose) or upside down, are its times others, does it stand? "
                 "lineament calibrate compares both"
             )
