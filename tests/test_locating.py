@@ -23,7 +23,7 @@ from lineament.logs import save_npz
 from lineament.mapping import LineMap
 from lineament.mapping.evidence import Evidence
 from lineament.mapping.following import Follower, Whereabouts, follow
-from lineament.motion.odometry import combined
+from lineament.mapping.refine import combined
 from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room

@@ -12,7 +12,7 @@ from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker, Tracks
 from ..motion.deskew import beam_times, deskew
-from ..motion.odometry import combined, compose_covariances
+from ..motion.odometry import compose_covariances
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
@@ -21,6 +21,7 @@ from .evidence import ON_DRAWING, Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import FASTEST, LocalMap, beams_of, thinned
 from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
+from .refine import combined
 from .wheels import OdometryCheck
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].

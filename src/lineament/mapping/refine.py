@@ -1,11 +1,13 @@
 """The pose of a local map on a plan by its walls, with its covariance."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.mapping.refining import refine as kernel
 from ..motion.association import chi_square
-from ..scan import Array
+from ..scan import Array, Pose
 from ..walls import wrapped
 from .index import Index
 from .local_map import Query
@@ -65,6 +67,23 @@ def adjusted(
     by_pose = weights @ jacobian
     information = jacobian.T @ by_pose
     return pose - np.linalg.solve(information + WEAK, by_pose.T @ error), information
+
+
+def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:
+    """Combine two poses, each with its covariance, whose errors may be the same ones.
+
+    Covariance intersection (Julier and Uhlmann 1997): of the weighted means that never claim too
+    much, that of the least determinant.
+    """
+    of_known, of_other = np.linalg.inv(known[1]), np.linalg.inv(other[1])
+    weights = np.linspace(0.0, 1.0, 21)[:, None, None]
+    sums = (1 - weights) * of_known + weights * of_other
+    best = int(np.linalg.det(sums).argmax())
+    covariance = np.linalg.inv(sums[best])
+    off = np.subtract(other[0], known[0])
+    off[2] = math.remainder(off[2], 2 * math.pi)
+    x, y, theta = (known[0] + weights[best, 0, 0] * covariance @ of_other @ off).tolist()
+    return (x, y, math.remainder(theta, 2 * math.pi)), covariance
 
 
 def _equations(

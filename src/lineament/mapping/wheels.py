@@ -69,7 +69,7 @@ class OdometryCheck:
         if not (self.is_believed or self._is_warned):
             self._is_warned = True
             warn(
-                "odometry contradicts the scans, and is left out where it does: does it stand still, "
-                "is the scanner mounted otherwise (laser_pose) or upside down, are its times others? "
-                "lineament calibrate compares both"
+                "odometry contradicts the scans, and is left out where it does: does it stand "
+                "still, is the scanner mounted otherwise (laser_pose) or upside down, are its "
+                "times others? lineament calibrate compares both"
             )

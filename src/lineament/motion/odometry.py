@@ -105,23 +105,6 @@ def compose_covariances(pose: Pose, known: Array, motion: Pose, spread: Array) -
     return np.asarray(of_pose @ known @ of_pose.T + of_motion @ spread @ of_motion.T)
 
 
-def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:
-    """Combine two poses, each with its covariance, whose errors may be the same ones.
-
-    Covariance intersection (Julier and Uhlmann 1997): of the weighted means that never claim too
-    much, that of the least determinant.
-    """
-    of_known, of_other = np.linalg.inv(known[1]), np.linalg.inv(other[1])
-    weights = np.linspace(0.0, 1.0, 21)[:, None, None]
-    sums = (1 - weights) * of_known + weights * of_other
-    best = int(np.linalg.det(sums).argmax())
-    covariance = np.linalg.inv(sums[best])
-    off = np.subtract(other[0], known[0])
-    off[2] = math.remainder(off[2], 2 * math.pi)
-    x, y, theta = (known[0] + weights[best, 0, 0] * covariance @ of_other @ off).tolist()
-    return (x, y, math.remainder(theta, 2 * math.pi)), covariance
-
-
 def covariance_grown(
     motion: Pose, least: tuple[float, float], growth: tuple[float, float]
 ) -> Array:
