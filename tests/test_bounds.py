@@ -173,6 +173,7 @@ def test_noiseless_ranges_have_the_least_noise_of_the_methods():
         (lambda: arc_bound([0, 0.1, 0.1], (2, 0), 0.5, NOISE), "fewer than three"),
         (lambda: arc_bound([0, 0.1, 0.3], (2, 0), 0.5, NOISE), r"bearings\[2\] is 0.3 rad"),
         (lambda: arc_bound([0, 0.1, 3.1], (2, 0), 0.5, NOISE), r"bearings\[2\] is 3.1 rad"),
+        (lambda: arc_bound([0, 0.1, 0.2], (2, 0), -0.5, NOISE), "radius is -0.5, expected"),
         (lambda: wall_end_bound((2, 0), 0.0, 0.01), "points at the scanner"),
         (lambda: corner_bound(*[LineBound(np.zeros(2), 0.5, np.eye(2))] * 2), "are parallel: no"),
     ],

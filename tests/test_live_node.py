@@ -358,13 +358,13 @@ def test_odometry_knows_how_long_a_sweep_took_that_is_not_deskewed(deskew, scan_
     pipeline, swept = Pipeline(LiveConfig(deskew=deskew, dock=(5.0, 2.0))), []
     kept = pipeline._publisher("one")
     odometer = kept.odometer
-    kept.odometer = lambda tracks, stamp, sweep: (
-        swept.append(sweep) or odometer(tracks, stamp, sweep)
+    kept.odometer = lambda tracks, stamp, sweep, *, deskewed: (
+        swept.append((sweep, deskewed)) or odometer(tracks, stamp, sweep, deskewed=deskewed)
     )
     pipeline.hear(moving(1.0, 0.0, 0.0))
     frame = pipeline("one", sweep(scan_time=scan_time))
     assert (frame.straight is frame.scan) == (deskew == "off")
-    assert swept == [sweep_time]
+    assert swept == [(sweep_time, deskew != "off")]
 
 
 def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):

@@ -13,6 +13,7 @@ from lineament.motion import Motion, Odometer, Tracker
 from lineament.motion.odometry import compose_jacobians, covariance_of_twist
 from lineament.scan.poses import compose, relative, twist_between
 from lineament.simulation import SENSORS, drive, room
+from lineament.simulation.raycast import cast_rays
 
 SPREAD = np.array([[4.0, 1.0, -0.5], [1.0, 2.0, 0.3], [-0.5, 0.3, 1.0]]) * 1e-4
 MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5), (3, 0.5, 1.6e-4)]
@@ -112,19 +113,62 @@ def test_the_skew_of_a_sweep_adds_up_and_is_in_the_covariance(sweep):
     assert travel.pose == known.pose
 
 
+@pytest.mark.parametrize("deskewed", [False, True])
 @pytest.mark.parametrize("sweep", [0.0, 0.5])
-def test_covariances_and_what_is_not_deskewed_add_up(sweep):
-    """Half a circle takes half of the time from scan to scan: each motion is off by its share."""
+def test_covariances_and_what_scans_are_off_by_add_up(sweep, deskewed):
+    """Half a circle takes half of the time from scan to scan: each motion is off by its share.
+
+    And by half a sweep at what the twist has changed since the last one, or the change itself has,
+    if the scan is deskewed by the twist before.
+    """
     odometer, pose = Odometer(), (0.0, 0.0, 0.0)
     odometer(tracks(None), 5.0)
-    spread, skew = np.zeros((3, 3)), np.zeros(3)
-    for k, motion in enumerate(MOTIONS[:3], 1):
-        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.0 + k, sweep=sweep)
+    spread, skews = np.zeros((3, 3)), np.zeros((2, 3))
+    twists = [np.array(twist_between((0, 0, 0), motion, 1.0)) for motion in MOTIONS[:3]]
+    if deskewed:
+        twists = np.diff([np.zeros(3), *twists], axis=0)
+    changes = np.diff([np.zeros(3) if deskewed else twists[0], *twists], axis=0)
+    for k, (motion, change) in enumerate(zip(MOTIONS[:3], changes, strict=True), 1):
+        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.0 + k, sweep=sweep, deskewed=deskewed)
         of_pose, of_motion = compose_jacobians(pose, motion)
         spread = of_pose @ spread @ of_pose.T + of_motion @ SPREAD @ of_motion.T
-        skew = of_pose @ skew + of_motion @ (np.array(motion) * motion[2] * sweep / (2 * math.pi))
+        new = np.array((change * sweep / 2, np.array(motion) * motion[2] * sweep / (2 * math.pi)))
+        new[1] *= not deskewed
+        skews = skews @ of_pose.T + new @ of_motion.T
         pose = compose(pose, motion)
-        np.testing.assert_allclose(travel.covariance, spread + np.outer(skew, skew), rtol=1e-9)
+        np.testing.assert_allclose(travel.covariance, spread + skews.T @ skews, rtol=1e-9)
+        by_walls = covariance_of_twist(Motion(*motion, SPREAD), 1.0)
+        np.testing.assert_allclose(travel.twist_covariance, by_walls + new.T @ new, rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("deskewed", [False, True])
+def test_the_twist_is_as_well_known_as_it_says_where_it_changes(deskewed):
+    """A sensor that turns to and fro, 0.8 rad/s within a second, with scans of a tenth of one."""
+    tracker, odometer, extract = Tracker(), Odometer(), ln.Extractor()
+    angles, errors, before = np.linspace(-math.pi, math.pi, 360, endpoint=False), [], None
+    rng = np.random.default_rng(4)
+    for k in range(60):
+        at = 0.1 * k
+        times = at + (angles + math.pi) / (20 * math.pi)
+        turns = (1 - np.cos(math.pi / 2 * times)) * 1.6 / math.pi
+        poses = np.column_stack((-1.0 + 0.2 * times, np.full(360, 0.3), turns))
+        ranges, _ = cast_rays(room(), poses, angles)
+        ranges += 0.005 * rng.standard_normal(360)
+        scan = ln.LaserScan(ranges, angles=angles, stamp=at, scan_time=0.1)
+        straight = ln.deskew(scan, tracker.twist) if deskewed else scan
+        travel = odometer(tracker(extract(straight)), at, 0.1, deskewed=deskewed)
+        if k > 3:
+            off = np.subtract(travel.twist, twist_between(before, tuple(poses[0]), 0.1))
+            errors.append(off @ np.linalg.solve(travel.twist_covariance, off) / 3)
+        before = tuple(poses[0])
+    assert 0.5 < np.mean(errors) < 1.0
+
+
+def test_a_sweep_that_is_no_time_is_refused():
+    for sweep in (math.nan, -0.1):
+        with pytest.raises(ValueError, match=f"sweep is {sweep}, expected a time ≥ 0"):
+            Odometer()(tracks(None), 0.0, sweep)
 
 
 def test_stamps_that_are_no_time_are_refused_and_far_ones_are_not():

@@ -259,8 +259,8 @@ def test_odometry_is_taken_for_its_change_alone():
     tracks = tracker(FRAME.transform(*inverse(motion)), compose(far, (0.62, -0.28, 0.79)))
     assert tracks.segments.tolist() == [0, 1]
     np.testing.assert_allclose(tracks.motion.pose, motion, atol=1e-3)
-    for bad in ((0, math.nan, 0), (0, 0)):
-        with pytest.raises(ValueError, match=r"odometry is .*, expected three finite numbers"):
+    for bad in ((0, math.nan, 0), (0, 0), "abc", 3.0):
+        with pytest.raises(ValueError, match=r"odometry is .*, expected (three finite|\(x, y, th)"):
             tracker(FRAME, bad)
     assert tracker(FRAME.transform(*inverse(motion))).born.tolist() == []
 
@@ -270,7 +270,7 @@ def test_odometry_is_taken_for_its_change_alone():
     [
         *(("max_missed", 0, -1), ("max_missed", 1, True), ("gate", 1e-9, 0.0)),
         *(("gate", 1 - 1e-9, 1.0), ("roughness", 0.0, -1e-9), ("roughness", 1e9, math.inf)),
-        ("gate", 0.5, math.nan),
+        *(("gate", 0.5, math.nan), ("max_missed", np.int64(1), -2)),
     ],
 )
 def test_settings(name, accepted, refused):

@@ -177,6 +177,8 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Nois
     beams = _bearings(bearings, 3)
     if len(np.unique(beams)) < 3:
         raise ValueError("bearings hold fewer than three different ones")
+    if not 0 < radius < math.inf:
+        raise ValueError(f"radius is {radius!r}, expected a finite length > 0")
     x, y = np.asarray(center, dtype=np.float64)
     cosines, sines = np.cos(beams), np.sin(beams)
     along, across = cosines * x + sines * y, cosines * y - sines * x

@@ -171,9 +171,12 @@ class Pipeline(InTurn):
         if kept.tracker is not None:
             tracks = kept.tracker(features)
             # A circle of a time that is not known takes as long as from scan to scan.
-            sweep = abs(scan.scan_time) or math.inf
-            travel = kept.odometer(tracks, scan.stamp, sweep if straight is scan else 0.0)
-            if self._config.deskew == "scans" and twist is None:
+            sweep, by_scans = abs(scan.scan_time) or math.inf, self._config.deskew == "scans"
+            is_straight = straight is not scan
+            if is_straight and not by_scans:
+                sweep = 0.0  # What odometry leaves of the motion is not known here.
+            travel = kept.odometer(tracks, scan.stamp, sweep, deskewed=is_straight)
+            if by_scans and twist is None:
                 straight = deskew(scan, kept.tracker.twist)
                 if straight is not scan:
                     features = kept.extractor(straight)

@@ -45,6 +45,10 @@ class Odometer(InTurn):
     are off by their ωT/2π, always to the side to which the mirror turns. This adds up, a turn to
     the left and one to the right alike, and is a part of the covariance.
 
+    A scan shows where the sensor was in the middle of its sweep, T/2 after its stamp, or how far it
+    was from where the twist by which it is deskewed would have it. As the twist changes, motions
+    are off by T/2 times the change.
+
     Examples
     --------
     >>> import lineament as ln
@@ -59,36 +63,54 @@ class Odometer(InTurn):
     def __init__(self) -> None:
         self._pose: Pose = (0.0, 0.0, 0.0)
         self._covariance = np.zeros((3, 3))
-        #: What the pose is off by if scans are not deskewed, and the mirror turns to the left.
-        self._skew = np.zeros(3)
+        #: What the pose is off by as scans are not of their stamps, and as the mirror turns.
+        self._skews = np.zeros((2, 3))
         self._stamp = math.nan
+        #: The last twist, and how far the scan was from where it was at its stamp.
+        self._twist = np.zeros(3)
+        self._late: Array | None = None
 
     @in_turn
-    def __call__(self, tracks: Tracks, stamp: float, sweep: float = 0.0) -> Travel:
+    def __call__(
+        self, tracks: Tracks, stamp: float, sweep: float = 0.0, *, deskewed: bool = False
+    ) -> Travel:
         """Go on by the motion to the next scan, which was taken at `stamp` [s].
 
-        `sweep` is how long the mirror takes for a circle, of a scan that is not deskewed [s]: inf
-        where that is not known, and is taken to be the time from scan to scan; 0 if it is deskewed.
-        ValueError if the stamp is not finite.
+        `sweep` is how long the mirror takes for a circle [s]: inf where that is not known, and is
+        taken to be the time from scan to scan; 0 for scans that are taken at once, or deskewed by
+        another odometry. `deskewed` is whether they are deskewed by the twist of the scans before.
+        ValueError if the stamp is not finite, or the sweep is not ≥ 0.
         """
         stamp, last = finite("stamp", stamp), self._stamp
+        if not sweep >= 0:
+            raise ValueError(f"sweep is {sweep!r}, expected a time ≥ 0")
         motion, duration, self._stamp = tracks.motion, stamp - last, stamp
         twist, twist_covariance = (0.0, 0.0, 0.0), np.eye(3) * FASTEST**2
         if motion is not None:
             before = self._pose, self._covariance
             self._covariance = compose_covariances(*before, motion.pose, motion.covariance)
             of_pose, of_motion = compose_jacobians(self._pose, motion.pose)
-            turns = min(sweep / duration, 1.0) / (2 * math.pi) if duration > 0 else 0.0
-            skew = np.array(motion.pose) * motion.theta * turns
-            self._skew = of_pose @ self._skew + of_motion @ skew
+            found = motion.twist(duration) if duration > 0 else (math.inf,) * 3
+            skews = np.zeros((2, 3))
+            if all(abs(speed) <= FASTEST for speed in found):
+                share = min(sweep / duration, 1.0)
+                skews[0] = self._late_by(np.array(found), share * duration, deskewed=deskewed)
+                if not deskewed:
+                    skews[1] = np.array(motion.pose) * motion.theta * share / (2 * math.pi)
+                twist, twist_covariance = found, covariance_of_twist(motion, duration)
+                of_twist = skews / duration
+                twist_covariance += of_twist.T @ of_twist
+            self._skews = self._skews @ of_pose.T + skews @ of_motion.T
             self._pose = compose(self._pose, motion.pose)
-            if duration > 0:
-                found = motion.twist(duration)
-                if all(abs(speed) <= FASTEST for speed in found):
-                    twist, twist_covariance = found, covariance_of_twist(motion, duration)
-                    twist_covariance += np.outer(skew / duration, skew / duration)
-        covariance = self._covariance + np.outer(self._skew, self._skew)
+        covariance = self._covariance + self._skews.T @ self._skews
         return Travel(self._pose, covariance, twist, twist_covariance)
+
+    def _late_by(self, twist: Array, sweep: float, *, deskewed: bool) -> Array:
+        """Return what a motion is off by, as its two scans are not of their stamps, shape (3,)."""
+        late = (twist - self._twist if deskewed else twist) * sweep / 2
+        before = late if self._late is None and not deskewed else self._late
+        self._twist, self._late = twist, late
+        return late if before is None else np.asarray(late - before)
 
 
 def compose_jacobians(pose: Pose, motion: Pose) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from .._copies import InTurn, in_turn
 from ..features import TABLES, Features
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
+from ..scan.fields import at_least_0, checked_pose
 from ..scan.poses import Twist, inverse, poses_along, relative
 from .association import KINDS, Frame, Pairs, chi_square, paired, words_of
 from .estimate import Motion, motion_by
@@ -82,6 +84,10 @@ class Tracker(InTurn):
     one place where it may be, as in a room that is the same from both ends, no direction of the
     motion is observed, and all tracks end.
 
+    The covariance of the motion is that of the scans as they are given. What scans are off by as
+    the sensor moves while they sweep is not in it, nor what `deskew` leaves of that where the twist
+    changes; `Odometer` adds it.
+
     Parameters
     ----------
     max_missed : int
@@ -106,10 +112,10 @@ class Tracker(InTurn):
     """
 
     def __init__(self, max_missed: int = 5, *, gate: float = 0.99, roughness: float = 0.01) -> None:
-        if isinstance(max_missed, bool) or not isinstance(max_missed, int) or max_missed < 0:
+        is_whole = isinstance(max_missed, Integral) and not isinstance(max_missed, bool)
+        if not is_whole or max_missed < 0:
             raise ValueError(f"max_missed is {max_missed!r}, expected a whole number ≥ 0")
-        if not 0 <= roughness < math.inf:
-            raise ValueError(f"roughness is {roughness}, expected a finite length ≥ 0")
+        at_least_0("roughness", roughness)
         chi_square(gate, 2)
         self.max_missed, self.gate, self.roughness = max_missed, gate, roughness
         #: Last sight of each track, in the frame of the last scan; those of that scan come first.
@@ -165,8 +171,8 @@ class Tracker(InTurn):
         if not isinstance(features, Features):
             kind = type(features).__name__
             raise TypeError(f"features is of type {kind}, expected Features: what extract returns")
-        if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
-            raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
+        if odometry is not None:
+            odometry = checked_pose(odometry, "odometry")
         motion, pairs, frame = None, _LOST, Frame.of(words_of(features))
         if self._stamp is not None:
             duration = features.stamp - self._stamp
