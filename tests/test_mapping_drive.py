@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
@@ -12,7 +13,7 @@ from robot_driving import storey_driven
 from small_room import placed
 
 from lineament import Extractor, LaserScan
-from lineament.cli import cli
+from lineament.cli import cli, run
 from lineament.errors import LineamentError
 from lineament.features import SEGMENT
 from lineament.logs import save_log
@@ -361,3 +362,20 @@ def test_one_scan_is_a_map():
     made = make_map(way.frames, way.scans)
     np.testing.assert_allclose(made.poses, [(0, 0, 0)], atol=1e-12)
     assert len(made.map.walls) >= 4
+
+
+def test_scans_of_a_moving_robot_are_deskewed(tmp_path):
+    """By odometry they are as if they had been taken at once; else poses are off by decimetres."""
+    sensor = replace(SENSORS["rplidar"], rate=8.0)
+    walk = [(-2, -1), (2, -1), (2, 1), (-2, 1), (-2, -1), (1, 0)]
+    scans = list(drive(room(), walk, sensor, speed=1.0, moving=True, seed=2))
+    save_log(tmp_path / "log.npz", scans)
+    off = {}
+    for given in ((), ("--no-deskew",)):
+        out = [str(tmp_path / name) for name in ("map.svg", "poses.tum")]
+        assert run(["map", str(tmp_path / "log.npz"), "-o", out[0], "--poses", out[1], *given]) == 0
+        _, x, y, *_ = np.loadtxt(out[1]).T
+        true = np.array([relative(scans[0].pose, scan.pose)[:2] for scan in scans])
+        off[given] = np.sqrt(np.mean((x - true[:, 0]) ** 2 + (y - true[:, 1]) ** 2))
+    assert off[()] < 0.02
+    assert off["--no-deskew",] > 0.08

@@ -14,7 +14,7 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap, wheels
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.following import Follower, follow
-from lineament.mapping.wheels import OdometryCheck
+from lineament.mapping.wheels import OdometryCheck, with_twists
 from lineament.scan.poses import compose, relative
 
 SAID = "odometry contradicts the scans, and is left out where it does"
@@ -135,6 +135,23 @@ def test_a_map_is_made_without_wrong_odometry(drive):
             np.testing.assert_allclose(relative(right, frame.motion.pose), 0, atol=0.05)
             assert not frame.is_lost
             assert not frame.has_odometry
+
+
+def test_the_twist_while_a_scan_is_swept_is_that_to_the_next_scan():
+    poses = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), None, (0.5, 0.0, 0.0), (0.5, 0.0, 0.2)]
+    stamps = [0.0, 0.1, 0.2, 0.3, 0.5]
+    scans = [
+        ln.LaserScan([1.0], 0.0, 0.1, stamp=stamp).with_pose(pose)
+        for stamp, pose in zip(stamps, poses, strict=True)
+    ]
+    found = list(with_twists(scans, odometry=True))
+    assert [scan for scan, _ in found] == scans
+    twists = [None if twist is None else pytest.approx(twist) for _, twist in found]
+    assert twists == [(1.0, 0, 0), None, None, (0, 0, 1.0), (0, 0, 1.0)]
+    assert [twist for _, twist in with_twists(scans, odometry=False)] == [None] * 5
+    late = [scan.stamped("first", k * 10**10) for k, scan in enumerate(scans[:2])]
+    assert [twist for _, twist in with_twists(late, odometry=True)] == [None, None]
+    assert list(with_twists([], odometry=True)) == []
 
 
 def test_commands_warn_of_it(tmp_path, drive, capsys):

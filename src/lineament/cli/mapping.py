@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from ..extractor import Extractor
 
 _NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
+_NO_DESKEW = click.option(
+    "--no-deskew", is_flag=True, help="The scans of the log are deskewed already."
+)
 
 
 def _check_odometry(no_odometry: bool, topic: str | None) -> None:
@@ -47,6 +50,7 @@ _PICTURES = (".png", ".svg", ".pdf")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
 @click.option("--merge", is_flag=True, help="With the walls of the plan of --onto, as one map.")
 @_NO_ODOMETRY
+@_NO_DESKEW
 @extracting
 @reading
 @QUIET
@@ -58,6 +62,7 @@ def map_command(
     onto: Path | None,
     merge: bool,
     no_odometry: bool,
+    no_deskew: bool,
     extractor: Extractor,
     reading: dict[str, Any],
     quiet: bool,
@@ -86,6 +91,7 @@ def map_command(
         onto=onto,
         merge=merge,
         odometry=not no_odometry,
+        deskewed=not no_deskew,
         track=tracker(quiet),
         **reading,
     )
@@ -107,7 +113,7 @@ def map_command(
 @click.option("--picture", type=PATH, help="The way on the plan: .png, .svg or .pdf.")
 @of_plan
 @_NO_ODOMETRY
-@click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
+@_NO_DESKEW
 @extracting
 @reading
 @QUIET

@@ -11,10 +11,11 @@ from .._copies import InTurn, in_turn
 from ..features import Features
 from ..kernels.mapping.beams import count_passes
 from ..motion.association import associate
+from ..motion.deskew import deskew
 from ..motion.estimate import Motion
 from ..motion.odometry import covariance_grown
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import compose, inverse, relative
+from ..scan.poses import Twist, compose, inverse, relative, twist_between
 from ..walls import Numbers, segments_of, wrapped
 from ..walls.sights import WHOLE, lines_of, sights_of, walls_along
 from .around import ROUGHNESS, USUAL, Around
@@ -124,6 +125,19 @@ class Drive(InTurn):
         self._check = OdometryCheck()
         #: Time from scan to scan, on average.
         self._pace = 1.0
+
+    @in_turn
+    def straight(self, scan: LaserScan, twist: Twist | None) -> LaserScan:
+        """Return the next scan as if it had been taken at once, at its stamp.
+
+        `twist` is the velocity by odometry. If that is not known, or not believed, the sensor is
+        thought to go on as in the last half second.
+        """
+        if twist is None or not self._check.is_believed:
+            twist = None
+            if len(self.scans) > 1 and scan.stamp > self._last[0]:
+                twist = twist_between((0.0, 0.0, 0.0), self._step, self._pace)
+        return deskew(scan, twist)
 
     @in_turn
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> Step:

@@ -15,21 +15,21 @@ from ..motion.deskew import beam_times, deskew
 from ..motion.odometry import compose_covariances
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
-from ..scan.poses import Twist, compose, twist_between
+from ..scan.poses import Twist, compose
 from .consistency import is_consistent
 from .evidence import ON_DRAWING, Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import FASTEST, LocalMap, beams_of, thinned
 from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 from .refine import combined
-from .wheels import OdometryCheck
+from .wheels import GAP, OdometryCheck, with_twists
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
 #: What was seen on so much way is compared with the plan where the pose is known [m].
 SEEN = 1.0
-#: Scans farther apart are not of one drive: by time without odometry [s], by odometry [m].
-GAP, JUMP = 5.0, 2.0
+#: Scans farther apart by odometry are not of one drive [m].
+JUMP = 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
 WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: So many looks at the plan that say that the sensor is not there are too many; each that says
@@ -158,14 +158,14 @@ class Follower(InTurn):
         return self._verdict in (LOCATED, UNOBSERVED) and unsure(self._covariance) < WORST
 
     @property
-    def believes_odometry(self) -> bool:
-        """Whether the odometry went with the scans so far: else it is left out."""
-        return self._check.is_believed
-
-    @property
     def twist(self) -> Twist | None:
         """Velocity of the sensor in the last scans, as `deskew` takes it."""
         return self._tracker.twist
+
+    @property
+    def believes_odometry(self) -> bool:
+        """Whether the odometry went with the scans so far: else it is left out."""
+        return self._check.is_believed
 
     @in_turn
     def __call__(
@@ -302,13 +302,11 @@ def follow(
     `odometry` is whether the poses of the scans are odometry; `deskewed`, whether scans are to be
     deskewed that say how long their sweep takes.
     """
-    follower, before, last = Follower(plan), None, _USUAL
-    for scan in scans:
-        given, twist, skew = scan.pose if odometry else None, follower.twist, np.zeros(3)
-        pose = given if follower.believes_odometry else None
-        if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
-            twist = twist_between(before[0], pose, scan.stamp - before[1])
-        before = None if pose is None else (pose, scan.stamp)
+    follower, last = Follower(plan), _USUAL
+    for scan, by_odometry in with_twists(scans, odometry):
+        pose, skew = scan.pose if odometry else None, np.zeros(3)
+        is_by_scans = by_odometry is None or not follower.believes_odometry
+        twist = follower.twist if is_by_scans else by_odometry
         straight = deskew(scan, twist) if deskewed else scan
         times = beam_times(scan) if deskewed else None
         if times is not None:
@@ -316,8 +314,8 @@ def follow(
             skew = (np.abs(now - last) + _UNEVEN * np.abs(now)) * np.ptp(times) / 2
             last = now
         x, y, turn = skew.tolist()
-        where = follower(extractor(straight), given, (x, y, turn))
-        if times is not None and pose is None and follower.twist is not None:
+        where = follower(extractor(straight), pose, (x, y, turn))
+        if times is not None and is_by_scans and follower.twist is not None:
             # Without odometry what was seen says how it went: not as it did before, perhaps.
             x, y, turn = (np.abs(np.subtract(follower.twist, last)) * np.ptp(times) / 2).tolist()
             where = replace(where, covariance=where.covariance + _blur(where.pose, (x, y, turn)))

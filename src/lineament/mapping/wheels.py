@@ -1,14 +1,17 @@
 """`OdometryCheck`: whether odometry goes with the scans, by which it is believed or left out."""
 
 import math
+from collections.abc import Iterable, Iterator
 
 from ..errors import warn
 from ..scan import LaserScan, Pose
-from ..scan.poses import relative
+from ..scan.poses import Twist, relative, twist_between
 from .consistency import LEAST, agreement
 
 #: Scans are compared after so much way or turn by odometry, or time [m, rad, s].
 _WAY, _TURN, _TIME = 0.5, math.radians(15.0), 1.0
+#: Scans farther apart do not show a velocity, nor are they of one drive without odometry [s].
+GAP = 5.0
 #: Of odometry that is right, so large a share of the comparisons fails: wheels that slip, people.
 #: Of odometry that is wrong, half of them do: in bare corridors it may go with the scans.
 _RIGHT, _WRONG = 0.2, 0.5
@@ -17,6 +20,32 @@ _FAILED, _HELD = math.log(_WRONG / _RIGHT), math.log((1 - _WRONG) / (1 - _RIGHT)
 #: hundred robots one is set up wrongly.
 _MOST = math.log(1e5)
 _FIRST = _MOST + math.log(0.01)
+
+
+def with_twists(
+    scans: Iterable[LaserScan], odometry: bool
+) -> Iterator[tuple[LaserScan, Twist | None]]:
+    """Yield each scan, and the velocity by odometry while it is swept; None if it is not known.
+
+    That is the one to the next scan, as stamps are of the first beam; of the last scan, the one
+    from the scan before.
+    """
+    before: LaserScan | None = None
+    twist: Twist | None = None
+    for scan in scans:
+        if before is not None:
+            twist = _twist(before, scan) if odometry else None
+            yield before, twist
+        before = scan
+    if before is not None:
+        yield before, twist
+
+
+def _twist(scan: LaserScan, after: LaserScan) -> Twist | None:
+    duration = after.stamp - scan.stamp
+    if scan.pose is None or after.pose is None or not 0 < duration < GAP:
+        return None
+    return twist_between(scan.pose, after.pose, duration)
 
 
 class OdometryCheck:

@@ -20,6 +20,7 @@ from ..mapping.drive_map import Drive
 from ..mapping.grids import GRID_ENDINGS, all_files
 from ..mapping.making import make_map
 from ..mapping.sessions import Merged, merge_onto, onto_plan, placements
+from ..mapping.wheels import with_twists
 from ..output import open_writer
 from ..output.canvas import count
 from ..output.figures import plot_walls
@@ -111,6 +112,7 @@ def map_log(
     merge: bool = False,
     picture: str | os.PathLike[str] | None = None,
     odometry: bool = True,
+    deskewed: bool = True,
     track: Track = untracked,
     **reading: Any,
 ) -> Mapping:
@@ -135,6 +137,8 @@ def map_log(
         Where to draw the walls and the way, ``.png``, ``.svg`` or ``.pdf``: red if not sure.
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
+    deskewed : bool
+        Whether scans are deskewed that say how long their sweep takes.
     track : callable
         ``track(items, name, whole)`` yields the scans, and what is looked at then, and shows the
         progress.
@@ -178,8 +182,9 @@ def map_log(
     started += time.perf_counter() - opened
     drive, stamps = Drive(), []
     # In the order of the log: a clock that is set back, or none, does not change where it was.
-    for scan in track(scans, Path(log.name).name, log):
-        drive.add(scan, extractor(scan), scan.pose if odometry else None)
+    for scan, twist in with_twists(track(scans, Path(log.name).name, log), odometry):
+        straight = drive.straight(scan, twist) if deskewed else scan
+        drive.add(straight, extractor(straight), scan.pose if odometry else None)
         stamps.append(scan.stamp)
     if not stamps:
         raise LogError(log.name, "has no scans, expected a drive")
