@@ -52,22 +52,24 @@ def beside(x, *stamps):
 def test_between_two_poses(tmp_path, kind, maker):
     def make(messages):
         pose = getattr(messages, maker)
-        yield from scans(messages, 1.5)
+        yield from scans(messages, 0.4, 0.5)
         yield "/pose", 2.0, pose(2.0, 1.0, 2.0, 3.0)
         yield from scans(messages, 2.0, 2.25)
         yield "/pose", 3.0, pose(3.0, 5.0, 0.0, -3.0)
         yield from scans(messages, 3.5)
 
     path = write(tmp_path, kind, make)
-    before, at, between, after = poses(path, "/pose")
-    assert before is None
+    with pytest.warns(LineamentWarning, match=r"log\.\w+: 1 of 5 scans have no pose: /pose"):
+        long_before, before, at, between, after = poses(path, "/pose")
+    assert long_before is None
+    assert before == pytest.approx((1.0, 2.0, 3.0))
     assert at == pytest.approx((1.0, 2.0, 3.0))
     # The heading goes on through π, the shorter way from 3 to -3.
     assert between == pytest.approx((2.0, 1.5, 3.0 + 0.25 * (2 * math.pi - 6.0)))
     assert after == pytest.approx((5.0, 0.0, -3.0))
-    assert [scan.pose for scan in open_log(path)] == [None] * 4
-    log = open_log(path, pose_topic="/pose", laser_pose=AT_BODY)
-    assert [scan.stamp for scan in log] == [1.5, 2.0, 2.25, 3.5]
+    log = open_log(path)  # No pose is asked for, and none is missed.
+    assert [scan.pose for scan in log] == [None] * 5
+    assert [scan.stamp for scan in log] == [0.4, 0.5, 2.0, 2.25, 3.5]
 
 
 @both
@@ -231,18 +233,20 @@ def test_stamps_that_run_backwards_find_their_poses(tmp_path):
 
 def test_scans_do_not_wait_for_ever(tmp_path, monkeypatch):
     """What stands far behind in the bag, or was recorded long ago, is not held in memory."""
-    monkeypatch.setattr(ros_poses, "MAX_WAITING", 2)
-    monkeypatch.setattr(ros_poses, "MAX_POSES", 3)
+    monkeypatch.setattr(ros_poses, "MAX_WAITING", 250)  # Two scans of two beams.
+    monkeypatch.setattr(ros_poses, "MAX_POSES", 12)
 
     def make(messages):
-        yield from scans(messages, *(0.1 * i for i in range(5)))
-        for i in range(20):
-            yield "/odom", 1 + i, messages.odometry(0.05 * i, i, 0.0, 0.0)
-        yield from scans(messages, 0.2, 0.7, time=50.0)
+        yield from scans(messages, *(0.2 * i for i in range(5)))
+        for i in range(100):
+            yield "/odom", 1 + i, messages.odometry(0.2 * i, 0.2 * i, 0.0, 0.0)
+        yield from scans(messages, 0.2, 0.7, time=200.0)
 
-    found = poses(write(tmp_path, "mcap-plain", make), "/odom")
+    path = write(tmp_path, "mcap-plain", make)
+    with pytest.warns(LineamentWarning, match="5 of 7 scans have no pose: /odom has none near"):
+        found = poses(path, "/odom")
     assert found[:3] == [None] * 3  # Given up when the next two came.
-    assert [pose and pose[0] for pose in found[3:5]] == pytest.approx([6.0, 8.0])
+    assert [pose and pose[0] for pose in found[3:5]] == pytest.approx([0.6, 0.8])
     assert found[5:] == [None, None]  # Of the poses, only the newest are kept.
 
 
@@ -252,7 +256,8 @@ def test_a_pose_without_measure_is_reported(tmp_path, x):
     with pytest.raises(LogError, match=r"/odom message 0: pose is \(.*, 0.0, 0.0\), expected"):
         poses(path, "/odom")
     log = open_log(path, pose_topic="/odom", keep_going=True, laser_pose=AT_BODY)
-    assert [scan.pose for scan in log] == [None]
+    with pytest.warns(LineamentWarning, match="1 of 1 scans have no pose: /odom has none near"):
+        assert [scan.pose for scan in log] == [None]
     assert log.skipped == 1
 
 

@@ -16,7 +16,7 @@ from text_logs import (
     tinyslam_line,
 )
 
-from lineament import LogError
+from lineament import LineamentWarning, LogError
 from lineament.logs import open_log
 
 # CARMEN
@@ -338,13 +338,25 @@ def test_csv_of_scans(write):
         "front,7.5,1,2,0.5,-0.1,0.1,30,hello,1.5,,2.5\r\n"
         '"rear",8,,,,-0.1,0.1,,,1.5,2\r\n'
     )
-    log = open_log(write(text))
+    with pytest.warns(LineamentWarning, match="columns note are not read: expected stamp, "):
+        log = open_log(write(text))
     first, second = log
     np.testing.assert_array_equal(first.ranges, [1.5, np.nan, 2.5])
     assert (first.stamp, first.frame_id, first.pose) == (7.5, "front", (1, 2, 0.5))
     assert (first.angle_min, first.angle_increment, first.range_max) == (-0.1, 0.1, 30)
     assert (second.ranges.tolist(), second.frame_id, second.pose) == ([1.5, 2], "rear", None)
     assert (second.range_max, len(log)) == (math.inf, 2)
+
+
+def test_columns_of_other_names_are_a_warning(write):
+    text = "time,x,y,yaw,angle_min,angle_increment,r0,r1,\n7,1,2,0.5,-0.1,0.1,1.5,2,\n"
+    said = r"columns time, yaw are not read: expected stamp, range_min, .*, y, theta, frame_id, or"
+    with pytest.warns(LineamentWarning, match=said) as caught:
+        (scan,) = open_log(write(text))
+    assert len(caught) == 1
+    assert (scan.stamp, scan.pose) == (0.0, None)
+    (scan,) = open_log(write(text.replace("time", "stamp").replace("yaw", "theta")))
+    assert (scan.stamp, scan.pose) == (7.0, (1.0, 2.0, 0.5))
 
 
 def test_faulty_csv_beams(write):

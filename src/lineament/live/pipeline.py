@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from .._copies import InTurn, in_turn
 from ..features import Features
 from ..limits import Limits
+from ..logs.sweeps import Sweeps
 from ..motion import CornerPose, Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import beam_times, deskew
 from ..motion.tracker import FASTEST
@@ -158,10 +159,11 @@ class Pipeline(InTurn):
         self._limits.check("beams", len(scan))
         scan = self._as_configured(scan)
         twist, kept.last = self._twist(kept, scan), scan
-        self._note(scan, twist)
-        own = twist
-        if twist is not None and mounting is not None:
-            own = twist_of_laser(twist, mounting)
+        kept.sweeps.add(scan)
+        own = None if kept.sweeps.is_too_long else twist
+        self._note(kept, scan, own)
+        if own is not None and mounting is not None:
+            own = twist_of_laser(own, mounting)
         straight = deskew(scan, own)
         return Frame(scan, straight, kept.extractor(straight), None), twist
 
@@ -176,7 +178,7 @@ class Pipeline(InTurn):
             if is_straight and not by_scans:
                 sweep = 0.0  # What odometry leaves of the motion is not known here.
             travel = kept.odometer(tracks, scan.stamp, sweep, deskewed=is_straight)
-            if by_scans and twist is None:
+            if by_scans and twist is None and not kept.sweeps.is_too_long:
                 straight = deskew(scan, kept.tracker.twist)
                 if straight is not scan:
                     features = kept.extractor(straight)
@@ -255,7 +257,7 @@ class Pipeline(InTurn):
         if self._localiser is not None:
             yield from self._localiser.problems()
 
-    def _note(self, scan: LaserScan, twist: Twist | None) -> None:
+    def _note(self, kept: _Publisher, scan: LaserScan, twist: Twist | None) -> None:
         """Note what keeps a scan from being deskewed, where that was asked for."""
         how = self._config.deskew
         if how == "off":
@@ -265,6 +267,8 @@ class Pipeline(InTurn):
             why = "they have neither time_increment nor scan_time"
         elif self._unmoved < MANY:
             return
+        elif kept.sweeps.is_too_long:
+            why = "their time_increment or scan_time is far longer than from scan to scan"
         elif how == "poses":
             why = "the log has no poses less than a second apart"
         elif how == "scans":
@@ -311,6 +315,7 @@ class _Publisher:
         self.extractor = extractor_of(config)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
+        self.sweeps = Sweeps()
         self.undocked = 0
         self.dock = dock_of(config) if config.is_docking else None
         self.last: LaserScan | None = None

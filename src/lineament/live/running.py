@@ -12,6 +12,7 @@ from ..extractor import WALL
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
 from ..progress import compiling
+from ..scan import LaserScan
 from .config import LiveConfig
 from .counters import Report
 from .merging import MergingPipeline
@@ -64,8 +65,10 @@ def run_live(
             # Of the wall that the kernels are tried on there is to be no map.
             trial = pipeline if config.mapping is None else Pipeline(replace(config, mapping=None))
             # The motion of tracks is estimated from the second scan on.
+            # It has times: that scans are not deskewed is a line if they have none.
+            wall = LaserScan(WALL.ranges, angles=WALL.angles, scan_time=0.1)
             with compiling():
-                for frame in (trial("", WALL), trial("", WALL)):
+                for frame in (trial("", wall), trial("", wall)):
                     feature_points(frame.features, frame.tracks)
         stack.enter_context(closing(pipeline))
         is_stopped()  # From here on a signal ends a node that runs, and not a start.

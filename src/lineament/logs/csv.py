@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import LogError
+from ..errors import LogError, one_line, shortened, warn
 from ..scan import LaserScan
 from .base import Head, Log
 from .bearings import bearing_fields, by_bearing
@@ -23,6 +23,7 @@ _ROW = re.compile(rb"\s*[^#\s]").match
 _BEARINGS = ("angle_min", "angle_increment")
 _SCALARS = (*_BEARINGS, "stamp", "range_min", "range_max", "scan_time", "time_increment")
 _POSE = ("x", "y", "theta")
+_OTHERS = (*(name for name in _SCALARS if name not in _BEARINGS), *_POSE, "frame_id")
 _RANGE = re.compile(r"r\d+$")
 # A row a beam. Names of the bearings, and whether they are degrees; None where the numbers show.
 _BEARING = ("angle", "bearing", "theta", "azimuth")
@@ -94,6 +95,14 @@ class CsvLog(_Csv, LineLog):
     @staticmethod
     def _fits(names: list[str], _: int) -> bool:
         return {*_BEARINGS, "r0"} <= set(names)
+
+    def _open(self) -> None:
+        super()._open()
+        known = {*_BEARINGS, *_OTHERS, ""}
+        if unread := [n for n in self._names if n not in known and not _RANGE.match(n)]:
+            names = shortened(f"columns {', '.join(unread)}")
+            expected = f"expected {', '.join(_OTHERS)}, or r0, r1, …"
+            warn(one_line(f"{self.name}: {names} are not read: {expected}"))
 
     def _kind(self, line: bytes) -> str:  # noqa: ARG002 (each row is a scan)
         return self.only_topic

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import chain, islice, pairwise
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ..errors import LogError, one_line, warn
 from ..rosmsg.frames import FASTEST
 from ..scan import LaserScan, Pose
 from .base import Log
+from .sweeps import JUDGED, Sweeps
 
 #: Headings in radians jump by a turn at most, where they wrap. Headings that jump by more than a
 #: turn and a half, so often, are in degrees.
@@ -20,8 +21,10 @@ _CHANGE, _CHANGES = 0.3, 3
 _WAY_OUT = "--no-odometry leaves it out"
 
 
-def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
+def one_scanner(log: Log, *, odometry: bool, deskewed: bool = False) -> Iterator[LaserScan]:
     """Return the scans of a log; a LogError if those of several topics, or scanners, are in it.
+
+    If they are to be `deskewed`, it is one, too, that beams take far longer than from scan to scan.
 
     Scanners share a topic if it returns to a frame that it left; a scanner may be renamed within a
     log. At the end of the log, a warning says if its poses, where they are `odometry`, are in other
@@ -30,7 +33,23 @@ def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
     if log.topic is None and len(log.topics) > 1:
         several = ", ".join(log.topics)
         raise LogError(log.name, f"has scans of {several}, expected those of one: choose it")
-    return _of_one_frame(log, odometry=odometry)
+    scans = _of_one_frame(log, odometry=odometry)
+    return _in_time(log.name, scans) if deskewed else scans
+
+
+def _in_time(name: str, scans: Iterator[LaserScan]) -> Iterator[LaserScan]:
+    """Pass on scans, unless the first of them take too long to be deskewed."""
+    sweeps, first = Sweeps(), list(islice(scans, JUDGED))
+    for scan in first:
+        sweeps.add(scan)
+    if sweeps.is_too_long:
+        problem = f"the beams of a scan take {sweeps.beams:.3g} s, and scans come every"
+        raise LogError(
+            name,
+            f"{problem} {sweeps.step:.3g} s: are time_increment and scan_time in seconds? "
+            "--no-deskew leaves them out",
+        )
+    yield from chain(first, scans)
 
 
 def _of_one_frame(log: Log, *, odometry: bool) -> Iterator[LaserScan]:

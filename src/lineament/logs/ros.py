@@ -146,7 +146,7 @@ class RosLog(Log):
         try:
             is_given = self.options.laser_pose is not None
             mountings = None if is_given else self._topics_of(TRANSFORMS)
-            finder = PoseFinder(self.options.pose_topic, self.limits, mountings)
+            finder = PoseFinder(self.name, self.options.pose_topic, self.limits, mountings)
         except ValueError as error:
             raise LogError(self.name, str(error)) from None
         if finder.topic not in self._topics_of(finder.types):
