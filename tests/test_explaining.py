@@ -147,6 +147,12 @@ def test_a_beam_that_is_not_there_is_refused(beam):
         explain(trace, beam)
 
 
+def test_a_beam_of_a_table_is_a_beam():
+    trace = Extractor(noise=NOISE).trace(wall_with([], []))
+    for beam in (np.int32(30), np.int64(30), np.uint8(30)):
+        assert explain(trace, beam) == explain(trace, 30)
+
+
 def test_what_is_no_trace_is_refused():
     with pytest.raises(TypeError, match=r"type LaserScan, expected a Trace: lineament\.trace"):
         explain(wall_with([], []), 3)

@@ -25,7 +25,7 @@ def test_a_batch_has_the_same_bytes_whatever_the_threads():
     rows = room(full_circle(360), BOX) + 0.01 * np.random.default_rng(0).normal(size=(14, 360))
     rows[7] = np.nan
     extractor, data = Extractor("liu", sigma_d=0.5), {name: set() for name in (*TABLES, "clusters")}
-    for workers in (1, 2, 3, 64):
+    for workers in (1, 2, np.int64(3), 64):
         batch = extractor.batch(rows, angles=full_circle(360), workers=workers, stamps=range(14))
         assert (len(batch), batch.stamps.tolist()) == (14, list(range(14)))
         for name, of in data.items():

@@ -57,6 +57,14 @@ def test_dict_is_json():
     assert (empty["noise"], empty["clusters"]) == (None, [-1, -1, -1])
 
 
+def test_what_is_not_known_is_none_in_a_dict():
+    scan = ln.LaserScan([2.0] * 9, 0.0, 0.01)
+    found = ln.extract(scan, method=lambda _: ([[0, 8]], [4]), noise=NOISE)
+    (corner,) = json.loads(json.dumps(found.to_dict(), allow_nan=False))["corners"]
+    assert corner["quality"] is None
+    assert corner["position"] == found.corners["position"][0].tolist()
+
+
 def test_reprs_and_counts():
     features = random_features(1, counts=(3, 4, 5, 2, 1))
     n = features.clusters.max() + 1

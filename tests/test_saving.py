@@ -160,6 +160,19 @@ def test_npz_round_trip(tmp_path, fields):
         assert archive["ranges"].dtype == np.float64  # 1 / 3 would not survive float32.
 
 
+def test_covariances_of_poses_are_kept(tmp_path):
+    known = np.diag((0.01, 0.02, 0.03)) + 0.001
+    scans = [scan(stamp=1.0).with_pose((1, 2, 3), known), scan(stamp=2.0).with_pose((4, 5, 6))]
+    save_npz(tmp_path / "a.npz", [*scans, scan(stamp=3.0).with_pose(None)])
+    first, second, third = open_log(tmp_path / "a.npz")
+    np.testing.assert_array_equal(first.pose_covariance, known)
+    assert (second.pose, second.pose_covariance) == ((4, 5, 6), None)
+    assert (third.pose, third.pose_covariance) == (None, None)
+    save_npz(tmp_path / "b.npz", scans[1:])
+    with np.load(tmp_path / "b.npz") as archive:
+        assert "pose_covariances" not in archive
+
+
 def test_float32_stays_float32(tmp_path):
     save_npz(tmp_path / "a.npz", [LaserScan(np.float32([0.1, 0.2]), 0.0, 0.1)])
     with np.load(tmp_path / "a.npz") as archive:

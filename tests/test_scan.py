@@ -108,6 +108,8 @@ def test_scan_is_read_only_and_a_copy():
     for name in ("ranges", "stamp", "anything"):
         with pytest.raises(AttributeError, match=f"{name} cannot be set"):
             setattr(scan, name, 1.0)
+    with pytest.raises(AttributeError, match="stamp cannot be deleted"):
+        del scan.stamp
     regular = LaserScan([1, 2], 0, 1)
     assert regular.ranges.dtype == regular.angles.dtype == np.float64
     with pytest.raises(ValueError, match="read-only"):

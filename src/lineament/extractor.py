@@ -16,7 +16,7 @@ from .methods.trace import Trace
 from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
-from .scan.fields import numbers
+from .scan.fields import is_whole, numbers
 from .scan.laser_scan import FIELDS, no_scan, scan_of
 from .scan.units import FAR, FEW, warn_of_units, warn_of_whole_numbers
 
@@ -146,7 +146,7 @@ class Extractor:
         """
         rows = _matrix(ranges)
         m, n = rows.shape
-        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        if not is_whole(workers) or workers < 1:
             raise ValueError(f"workers is {workers!r}, expected a whole number ≥ 1")
         times = np.zeros(m) if stamps is None else np.array(numbers("stamps", stamps))
         if times.shape != (m,):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..methods.trace import Trace
+from ..scan.fields import is_whole
 from .measurements import Line, Measurements, along_beam, spans, why_invalid
 
 #: Fewer measurements than this are no line in any of the methods.
@@ -65,9 +66,9 @@ def explain(trace: Trace, beam: int) -> Explanation:
             f"trace is of type {type(trace).__name__}, expected a Trace: lineament.trace(scan)"
         )
     n = len(trace.scan)
-    if isinstance(beam, bool) or not isinstance(beam, int) or not 0 <= beam < n:
+    if not is_whole(beam) or not 0 <= beam < n:
         raise ValueError(f"beam is {beam!r}, expected a whole number from 0 to {n - 1}")
-    return _Question(trace, beam).answer()
+    return _Question(trace, int(beam)).answer()
 
 
 class _Question:

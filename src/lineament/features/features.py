@@ -197,6 +197,8 @@ class Features(Tabled, LazyFields, ReadOnly, Pictured):
     def to_dict(self) -> dict[str, Any]:
         """Make plain dicts, lists, numbers and strings of everything, as JSON takes them.
 
+        What is not known, such as the quality of a corner of a method that has none, is None.
+
         Examples
         --------
         >>> import lineament as ln
@@ -250,8 +252,16 @@ def sizes(tables: Tabled) -> str:
 
 def _records(table: NDArray[np.void]) -> list[dict[str, Any]]:
     """List the records of a structured array as dicts of plain lists and numbers."""
-    columns = {name: table[name].tolist() for name in table.dtype.names or ()}
+    columns = {name: _plain(table[name]) for name in table.dtype.names or ()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _plain(values: NDArray[Any]) -> list[Any]:
+    """List numbers, None in place of those that are not finite: JSON has none such."""
+    if values.dtype.kind == "f" and not (known := np.isfinite(values)).all():
+        values = values.astype(object)
+        values[~known] = None
+    return list(values.tolist())
 
 
 def checked_features(features: Any) -> Features:

@@ -28,6 +28,7 @@ SHAPES = {
     "stamps": ("n",),
     "stamps_ns": ("n",),
     "poses": ("n3",),
+    "pose_covariances": ("n33",),
     "intensities": ("nm",),
     **dict.fromkeys((*SCALARS, "stamp_beam", "frame_id"), ("", "n")),
 }
@@ -40,8 +41,9 @@ class NpzLog(Log):
     ``angle_increment`` rad, or ``angles`` (M,); optional ``range_min``, ``range_max`` m,
     ``scan_time``, ``time_increment`` s, ``frame_id`` (one, or N of them), ``stamps`` (N,) s,
     ``stamps_ns`` (N,) ns where seconds do not hold them, ``stamp_beam`` (see `LaserScan`),
-    ``poses`` (N, 3) m, m, rad (not finite where unknown), ``intensities`` (N, M). Other keys
-    are left alone. Arrays stay as stored; rows become float64 as they are read.
+    ``poses`` (N, 3) m, m, rad and ``pose_covariances`` (N, 3, 3), not finite where unknown,
+    ``intensities`` (N, M). Other keys are left alone. Arrays stay as stored; rows become float64 as
+    they are read.
     """
 
     format = "npz"
@@ -86,6 +88,8 @@ class NpzLog(Log):
         if "poses" in arrays and np.isfinite(arrays["poses"][i]).all():
             fields["pose"] = tuple(arrays["poses"][i].tolist())
         scan = LaserScan(arrays["ranges"][i], **fields)
+        if "pose_covariances" in arrays and np.isfinite(arrays["pose_covariances"][i]).all():
+            scan = scan.with_pose(scan.pose, arrays["pose_covariances"][i])
         beam = scan.stamp_beam
         if "stamp_beam" in arrays:  # Of beams as they are stored, which may be clockwise.
             stored = float(_at(arrays["stamp_beam"], i))

@@ -133,10 +133,17 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
         arrays[key] = values[0] if (values == values[0]).all() else values
     if first.intensities is not None:
         arrays["intensities"] = lossless(np.array([scan.intensities for scan in scans]))
-    if any(scan.pose is not None for scan in scans):
-        unknown = (np.nan, np.nan, np.nan)
-        arrays["poses"] = np.array([scan.pose or unknown for scan in scans])
-    return arrays
+    arrays |= _where_known("poses", [scan.pose for scan in scans], (3,))
+    of_poses = [scan.pose_covariance for scan in scans]
+    return arrays | _where_known("pose_covariances", of_poses, (3, 3))
+
+
+def _where_known(key: str, values: list[Any], shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+    """Stack what is known of each scan, NaN where it is not; nothing if it is of none."""
+    if all(value is None for value in values):
+        return {}
+    unknown = np.full(shape, np.nan)
+    return {key: np.array([unknown if value is None else value for value in values])}
 
 
 def lossless(values: NDArray[np.float64]) -> NDArray[Any]:

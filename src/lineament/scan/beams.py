@@ -95,6 +95,8 @@ class Beams(ReadOnly, Pictured):
             range_min, range_max = range_limits(range_min, range_max)
             stamp, scan_time = finite("stamp", stamp), finite("scan_time", scan_time)
             time_increment = finite("time_increment", time_increment)
+            if not isinstance(frame_id, str):
+                raise ValueError(f"frame_id is {frame_id!r}, expected a string")
             frame_id = str(frame_id)
         own["angle_min"], own["angle_increment"] = angle_min, angle_increment
         own["range_min"], own["range_max"] = range_min, range_max

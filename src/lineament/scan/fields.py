@@ -2,7 +2,7 @@
 
 import math
 from datetime import UTC, datetime
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,11 @@ def at_least_0(name: str, value: object) -> float:
     if given < 0:
         raise ValueError(f"{name} is {given:g}, expected ≥ 0")
     return given
+
+
+def is_whole(value: object) -> bool:
+    """Whether a value is a whole number, of Python or NumPy."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:

@@ -78,6 +78,9 @@ class LaserScan(Beams):
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
 
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"LaserScan is read-only: {name} cannot be deleted")
+
     @overload
     def __getitem__(self, index: SupportsIndex) -> tuple[float, float]: ...
 

@@ -154,14 +154,14 @@ def calibrate_log(
     if output is not None:
         check_ending(output)
         check_outputs([output], [path])
-    log, scans = _read(path, reading)
+    log, scans = _read(path, reading, deskewed=deskewed)
     extractor = Extractor() if extractor is None else extractor
     load_kernels([extractor])
     poses = [scan.pose for scan in scans]
     if against is not None:
         if against == log.topic:
             raise LogError(log.name, f"--against {against} is the scanner itself")
-        _, others = _read(path, {**reading, "topic": against})
+        _, others = _read(path, {**reading, "topic": against}, deskewed=deskewed)
         others.sort(key=lambda scan: scan.stamp)  # Times are looked up among theirs.
         other_features = _features(others, extractor, deskewed=deskewed)
         carried = Carried.of(other_features, roughness)
@@ -197,10 +197,12 @@ def calibrate_log(
     )
 
 
-def _read(path: str | os.PathLike[str], reading: dict[str, Any]) -> tuple[Log, list[LaserScan]]:
+def _read(
+    path: str | os.PathLike[str], reading: dict[str, Any], *, deskewed: bool
+) -> tuple[Log, list[LaserScan]]:
     """Read the scans of a topic in the order of the log, with poses as it has them."""
     log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
-    scans = list(one_scanner(log, odometry=False))
+    scans = list(one_scanner(log, odometry=False, deskewed=deskewed))
     if len(scans) > 1 and len({scan.stamp for scan in scans}) == 1:
         stamp = scans[0].stamp
         raise LogError(log.name, f"all stamps are {stamp}, expected stamps that increase")

@@ -144,7 +144,7 @@ def locate_log(
     drawn = read(units=units)
     started = time.perf_counter()
     log = open_log(path, **reading)
-    scans = one_scanner(log, odometry=odometry)
+    scans = one_scanner(log, odometry=odometry, deskewed=deskewed)
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened

@@ -176,7 +176,7 @@ def map_log(
     plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
-    scans = one_scanner(log, odometry=odometry)
+    scans = one_scanner(log, odometry=odometry, deskewed=deskewed)
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
