@@ -200,9 +200,12 @@ def test_odometry_that_jumps_ends_a_part_or_is_bridged_by_walls():
 @pytest.mark.slow
 def test_odometry_of_another_robot_is_not_believed():
     (_, scans, truth), (_, others, _) = storey_driven(3, 150), storey_driven(5, 150)
-    made = mapped(scans, [scan.pose for scan in others])
-    assert max(errors_by_part(made, truth)) < 0.5
-    assert sum(way for *_, way in made.unsure) > 10
+    with pytest.warns(LineamentWarning, match="odometry contradicts the scans, and is left out"):
+        made = mapped(scans, [scan.pose for scan in others])
+    assert max(errors_by_part(made, truth)) < 0.01
+    # Until it is left out, the robot is lost where the two did not go alike.
+    ((first, last, _),) = made.unsure
+    assert 10 < first < last < 30
 
 
 @pytest.mark.slow
