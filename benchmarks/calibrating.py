@@ -105,15 +105,21 @@ def wheels(seed: int, metres: float) -> tuple[str, np.ndarray, np.ndarray]:
     return f"{len(scans)} scans, {done.steps} steps", error, found.covariance
 
 
-def real(path: Path) -> None:
-    """Calibrate the whole of a recording, each half, and correct the second by the first."""
-    data = dict(np.load(path))
+def recorded(path: Path) -> list[LaserScan]:
+    """Return the scans of a recording with the poses by its wheels."""
+    data = np.load(path)
     bearings = float(data["angle_min"]), float(data["angle_increment"])
     places: list[tuple[float, float, float]] = [(x, y, a) for x, y, a in data["odometry"].tolist()]
-    scans = [
+    return [
         LaserScan(ranges, *bearings, stamp=float(i), pose=pose)
         for i, (ranges, pose) in enumerate(zip(data["ranges"], places, strict=True))
     ]
+
+
+def real(path: Path) -> None:
+    """Calibrate the whole of a recording, each half, and correct the second by the first."""
+    data, scans = dict(np.load(path)), recorded(path)
+    places = [scan.pose for scan in scans]
     half = len(scans) // 2
     parts = {"whole": scans, "first half": scans[:half], "second half": scans[half:]}
     done = {name: calibrated(part, 0.0) for name, part in parts.items()}
